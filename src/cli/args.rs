@@ -3,7 +3,7 @@
 use std::num::NonZeroUsize;
 use std::path::PathBuf;
 
-use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
+use clap::builder::{PossibleValuesParser, TypedValueParser};
 use clap::{Arg, Args, CommandFactory, Parser, Subcommand, ValueEnum};
 
 use super::mesh::{ascii_help, format_name, output_help, unit_help, unit_name};
@@ -11,8 +11,8 @@ use super::render::Surface;
 use super::sweep::options::{Again, SweepOptions};
 pub(super) use super::values::{CameraFlag, CutFlag};
 use super::values::{
-    Definition, Deny, Frames, Tolerance, aabb, camera, count, cut, definition, deny, frames, length, plane,
-    point, seconds, threads, tolerance, window,
+    Definition, Deny, Frames, Tolerance, aabb, camera, cut, definition, deny, frames, length, plane, point,
+    seconds, threads, tolerance, window,
 };
 use glam::DVec3;
 use rfm::geom::Aabb;
@@ -20,7 +20,6 @@ use rfm::mesh::{Format, LengthUnit};
 use rfm::precision::Precision;
 use rfm::slice::Plane;
 use rfm::source::Target;
-use rfm::sph::Method;
 
 /// Obstacles written as R-functions, compiled to machine code: check, mesh, simulate.
 ///
@@ -116,11 +115,11 @@ pub(super) enum Command {
     /// Simulate the fluid of a scene around its obstacles
     Run(Run),
     /// Show a scene, a solid or the frames of a run in the browser, or save a run as one page
-    View(View),
+    View(super::view::View),
     /// Make pictures or a film of the frames of a run, or a picture of a solid
     Render(super::render::Render),
     /// Measure speed against error: of every program of a solid and its meshes, or of a flow that is known
-    Report(Report),
+    Report(super::report::Report),
     /// Explain a message, or show what a stage of the compiler makes of a file
     Explain(Explain),
     /// Lay out files: blanks, indentation, spelling of operators; lines end where they end
@@ -448,115 +447,12 @@ pub(super) struct Run {
     pub sweep: SweepOptions,
 }
 
-#[derive(Debug, Args)]
-#[command(after_help = "A run, while it is computed:  rfm view examples/pawn.rfm\n\
-                        A run that is saved:          rfm view examples/pawn.out\n\
-                        One file for a colleague:     rfm view examples/pawn.out --save pawn.html\n\
-                        From another machine:         ssh -L 8000:127.0.0.1:8000 HOST rfm view examples/pawn.rfm --no-open --port 8000\n\n\
-                        The page is served on this machine alone, at an address with a token that nobody can guess; keep it to \
-                        yourself. A file is read again whenever it changes. A simulation waits while no page is open. Ctrl-C ends \
-                        the viewer.")]
-pub(super) struct View {
-    /// A file, whose scene is simulated and whose solids are shown; or the folder of a run
-    #[arg(value_name = "FILE|DIR")]
-    pub subject: PathBuf,
-    /// The scene [default: the only one]
-    #[arg(long, value_name = "NAME")]
-    pub scene: Option<String>,
-    /// Show this solid instead of a scene [default: the last solid of a file without scenes]
-    #[arg(short, long, value_name = "NAME", conflicts_with = "scene")]
-    pub solid: Option<String>,
-    /// Cells of the obstacle's mesh along its longest side
-    #[arg(long, value_name = "N", default_value_t = 64)]
-    pub mesh_cells: usize,
-    /// Write one file that shows the run in any browser, and open nothing
-    #[arg(long, help_heading = "Runs", value_name = "FILE")]
-    pub save: Option<PathBuf>,
-    /// Only these frames of a run, counted from 0; B is the first that is left out [default: all]
-    #[arg(long, help_heading = "Runs", value_name = "A..B", value_parser = frames)]
-    pub frames: Option<Frames>,
-    /// Only every n-th frame of a run
-    #[arg(long, help_heading = "Runs", value_name = "N", default_value = "1", value_parser = count)]
-    pub every: usize,
-    /// Address to serve at; others than this machine's own let others connect, if they have the token
-    #[arg(long, help_heading = "Server", value_name = "HOST", default_value = "127.0.0.1")]
-    pub host: String,
-    /// Port to serve at [default: a free one]
-    #[arg(
-        long,
-        help_heading = "Server",
-        value_name = "PORT",
-        default_value_t = 0,
-        hide_default_value = true
-    )]
-    pub port: u16,
-    /// Print the address and open no browser
-    #[arg(long, help_heading = "Server")]
-    pub no_open: bool,
-}
-
-#[derive(Debug, Clone, Args)]
-#[command(after_help = "A solid is judged by exact arithmetic:  rfm report examples/pawn.rfm -o pawn.svg\n\
-                        A scene by its `truth`, at growing resolution:\n  \
-                        rfm report examples/validation/free_fall.rfm:free_fall --particles 125,1000 \
-                        --methods wcsph,dfsph -o fall.svg\n\
-                        All in a page for others:            rfm report examples/pawn.rfm --html pawn.html")]
-pub(super) struct Report {
-    /// The file, with the name of a solid or a scene if it has several; `-` is standard input
-    #[arg(value_name = "FILE[:NAME]")]
-    pub subject: String,
-    /// The solid [default: the only one, or the first obstacle of the scene]
-    #[arg(short, long, value_name = "NAME")]
-    pub solid: Option<String>,
-    /// Plot speed against error, or the error of a flow against its cost: .svg or .png
-    #[arg(short, long, value_name = "FILE")]
-    pub output: Option<PathBuf>,
-    /// Plot the error of meshes against their cells: .svg or .png
-    #[arg(long, value_name = "FILE")]
-    pub mesh_plot: Option<PathBuf>,
-    /// Write all of it as one page: tables, plots, pictures, the .rfm files, the machine and the command. It needs no
-    /// network
-    #[arg(long, value_name = "FILE")]
-    pub html: Option<PathBuf>,
-    /// Cells along the longest side of the finest mesh; the others have half as many each
-    #[arg(long, value_name = "N", default_value_t = 128)]
-    pub mesh_cells: usize,
-    #[command(flatten)]
-    pub flow: Flow,
-    #[command(flatten)]
-    pub sweep: SweepOptions,
-    #[command(flatten)]
-    pub again: Again,
-}
-
-/// How a flow is measured.
-#[derive(Debug, Clone, Args)]
-#[command(next_help_heading = "Flows")]
-pub(super) struct Flow {
-    /// Run the scene with so many particles, by its `param particles` [default: 1/16, 1/4 and all of what the
-    /// file states]
-    #[arg(long, value_name = "N,N,…", value_delimiter = ',', value_parser = count, conflicts_with_all = ["solid", "mesh_plot"])]
-    pub particles: Vec<usize>,
-    /// Run the scene by these methods, without keys that only its own method has [default: its own]
-    #[arg(long, value_parser = flow_method(), value_delimiter = ',', conflicts_with_all = ["solid", "mesh_plot"])]
-    pub methods: Vec<Method>,
-}
-
-/// A method of the solver by its name.
+/// A type of numbers by its name.
 fn precision() -> impl TypedValueParser<Value = Precision> {
     let precisions = [Precision::F32, Precision::F64];
     let unknown = "clap lets only the names of precisions through";
     PossibleValuesParser::new(precisions.map(Precision::name))
         .try_map(move |name| precisions.into_iter().find(|p| p.name() == name).ok_or(unknown))
-}
-
-fn flow_method() -> impl TypedValueParser<Value = Method> {
-    let names = Method::all().into_iter().map(|method| {
-        let info = method.info();
-        PossibleValue::new(info.name).help(info.title)
-    });
-    let unknown = "clap lets only the names of methods through";
-    PossibleValuesParser::new(names).try_map(move |name| Method::named(&name).ok_or(unknown))
 }
 
 #[derive(Debug, Args)]

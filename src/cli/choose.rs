@@ -45,11 +45,15 @@ pub(super) fn solid_at(
     name: Option<&str>,
     time: f64,
 ) -> Result<Solid, Failure> {
-    let solid = solid(shared, program, name)?;
+    Ok(at(&solid(shared, program, name)?, time))
+}
+
+/// A solid at a time in seconds. If it moves, a note says so.
+pub(super) fn at(solid: &Solid, time: f64) -> Solid {
     if solid.moves() {
         note(format!("`{}` moves: this is how it is at t = {time} s", solid.name()));
     }
-    Ok(solid.at(time))
+    solid.at(time)
 }
 
 fn default_solid(program: &Program) -> Result<&NamedSolid, Failure> {

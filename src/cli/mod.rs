@@ -39,6 +39,7 @@ mod survey;
 mod sweep;
 mod values;
 mod view;
+mod way;
 
 use std::ffi::OsString;
 use std::process::ExitCode;

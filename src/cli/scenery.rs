@@ -19,8 +19,8 @@ const NAMED: usize = 3;
 pub(super) enum Drawn {
     Whole,
     Open(Cut),
-    /// Clear, so that the fluid is seen through it.
-    Glass,
+    /// Clear, so that the fluid is seen through it; it may be cut open.
+    Glass(Option<Cut>),
     Hidden,
 }
 
@@ -60,7 +60,7 @@ pub(super) fn sharp<'a>(
 ) -> Vec<(Drawn, Mesh)> {
     let shown = bodies.filter(|(drawn, _)| *drawn != Drawn::Hidden);
     let sharpened = |(drawn, mesh): (Drawn, &Mesh)| match drawn {
-        Drawn::Glass => (drawn, split_creases(&open_at_walls(mesh, domain))),
+        Drawn::Glass(_) => (drawn, split_creases(&open_at_walls(mesh, domain))),
         Drawn::Whole | Drawn::Open(_) | Drawn::Hidden => (drawn, split_creases(mesh)),
     };
     shown.map(sharpened).collect()
@@ -93,7 +93,7 @@ pub(super) fn views(bodies: &[(Drawn, Mesh)]) -> Vec<MeshView<'_>> {
 fn view(mesh: &Mesh, drawn: Drawn) -> MeshView<'_> {
     let (cut, material) = match drawn {
         Drawn::Open(cut) => (Some(cut), Material::Stone),
-        Drawn::Glass => (None, Material::Glass),
+        Drawn::Glass(cut) => (cut, Material::Glass),
         Drawn::Whole | Drawn::Hidden => (None, Material::Stone),
     };
     MeshView { cut, material, ..surface(mesh, Material::Stone) }
@@ -151,9 +151,9 @@ pub(super) fn described(names: &[&str], drawn: &[Drawn]) -> Vec<String> {
     for (name, drawn) in names.iter().zip(drawn) {
         let what = match drawn {
             // clear obstacles are seen to be clear
-            Drawn::Whole | Drawn::Glass => continue,
+            Drawn::Whole | Drawn::Glass(None) => continue,
             Drawn::Hidden => "left out".to_string(),
-            Drawn::Open(cut) => {
+            Drawn::Open(cut) | Drawn::Glass(Some(cut)) => {
                 let axis = cut.normal.abs().max_position();
                 format!("cut at {} = {}", ["x", "y", "z"][axis], cut.offset * cut.normal[axis] + 0.0)
             }

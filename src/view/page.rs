@@ -124,6 +124,7 @@ pub fn solid(title: &str, mesh: &Mesh, out: &mut dyn Write) -> io::Result<()> {
             size.z
         ),
         live: false,
+        moves: false,
         domain: Corners::from(&bounds),
         lattice: None,
         radius: 0.0,

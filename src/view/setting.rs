@@ -14,6 +14,8 @@ pub struct Setting {
     pub facts: String,
     /// Whether the page is connected to a simulation.
     pub live: bool,
+    /// Whether a solid moves where no fluid does.
+    pub moves: bool,
     /// The box whose edges are drawn.
     #[serde(rename = "box")]
     pub domain: Corners,

@@ -20,6 +20,9 @@ scene drop {
 }
 ";
 
+/// A solid that goes from the left to the right.
+const SWING: &str = "rfm 1\nsolid swing = sphere(0.2).move([2*t, 0, 0])\n";
+
 /// Runs the scene: six frames, 0.02 s apart, in `drop.out`.
 fn run(here: &Path) {
     std::fs::write(here.join("drop.rfm"), SCENE).unwrap();
@@ -262,7 +265,8 @@ fn refusals_say_why() {
     let folder = tempfile::tempdir().unwrap();
     let here = folder.path();
     run(here);
-    let cases: [(&[&str], &str); 18] = [
+    std::fs::write(here.join("swing.rfm"), SWING).unwrap();
+    let cases: [(&[&str], &str); 22] = [
         (&["drop.out", "-o", "a.jpg"], ".jpg is none of .png .gif .apng .mp4 .webm"),
         (&["drop.out", "-o", "a.png"], "`a.png` is one picture, and there are 6 frames"),
         (&["drop.out", "-o", "a.gif", "--fps", "60"], "50 is the most"),
@@ -277,7 +281,11 @@ fn refusals_say_why() {
         (&["drop.out", "--zoom", "0"], "expected a number from 0.05 to 20"),
         (&["drop.out", "--solid", "post"], "--solid is for a solid of a file"),
         (&["drop.rfm", "--by", "speed"], "--by is for the folder of a run"),
-        (&["drop.rfm", "-o", "a.gif"], "a solid is one picture"),
+        (&["drop.rfm", "-o", "a.gif"], "`post` does not move"),
+        (&["drop.rfm", "--times", "0..1"], "--times is for films"),
+        (&["swing.rfm", "-o", "a.gif", "--times", "0.."], "state the end"),
+        (&["swing.rfm", "-o", "a.gif", "--times", "0..1e9"], "100000 is the most"),
+        (&["swing.rfm", "-o", "a.gif", "--time", "1"], "--times A..B are those of a film"),
         (&["drop.rfm", "--cut", "auto"], "choose a plane"),
         (&["nothing.rfm"], "cannot read `nothing.rfm`"),
         (&["drop.out", "-o", "no/such/a.gif"], "does not exist"),
@@ -369,4 +377,44 @@ fn an_obstacle_that_moves_is_drawn_where_it_is() {
     render("one.png", &["--frames", "1"]);
     let bytes = |name: &str| std::fs::read(here.join(name)).unwrap();
     assert!(bytes("one.png") == bytes("all/frame_000001.png"));
+}
+
+#[test]
+fn a_solid_that_moves_becomes_a_film() {
+    let folder = tempfile::tempdir().unwrap();
+    let here = folder.path();
+    std::fs::write(here.join("swing.rfm"), SWING).unwrap();
+    let render = |target: &str, others: &[&str]| {
+        let flags = [
+            "render",
+            "swing.rfm",
+            "--size",
+            "640x480",
+            "--mesh-cells",
+            "24",
+            "--camera=0,-1,0.1",
+            "-o",
+            target,
+        ];
+        rfm(here, &[&flags[..], others].concat()).expect(0)
+    };
+    let told = render("all", &["--times", "0..1", "--fps", "4"]);
+    assert!(told.stdout.contains("5 pictures of 640 × 480, from 0 s to 1 s"), "{}", told.stdout);
+    // where stone is seen: all pictures have one camera, whose box holds the whole way
+    let middle = |k: usize| {
+        let pixels = pixels(&std::fs::read(here.join(format!("all/frame_{k:06}.png"))).unwrap());
+        let stones = pixels
+            .chunks(3)
+            .enumerate()
+            .filter(|(_, p)| (8..25).contains(&(i32::from(p[0]) - i32::from(p[2]))));
+        let columns: Vec<f64> = stones.map(|(i, _)| (i % 640) as f64).collect();
+        columns.iter().sum::<f64>() / columns.len() as f64
+    };
+    let middles = [0, 1, 2, 3, 4].map(middle);
+    assert!(middles.is_sorted() && middles[4] - middles[0] > 300.0, "{middles:?}");
+    for threads in ["1", "2"] {
+        render(&format!("{threads}.gif"), &["--times", "0..0.5", "--fps", "4", "--threads", threads]);
+    }
+    let bytes = |name: &str| std::fs::read(here.join(name)).unwrap();
+    assert!(bytes("1.gif") == bytes("2.gif") && bytes("1.gif").len() > 1000);
 }

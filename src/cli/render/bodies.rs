@@ -72,7 +72,10 @@ impl Bodies {
         let is_glass = |name: &String| self.are_named && options.glass.contains(name);
         let drawn = |(name, mesh): (&String, &Mesh)| match &options.cut {
             _ if is_hidden(name) => Drawn::Hidden,
-            _ if is_glass(name) => Drawn::Glass,
+            Some(CutFlag::Plane(plane)) if is_glass(name) => {
+                Drawn::Glass(Some(half_towards_eye(plane, camera)))
+            }
+            _ if is_glass(name) => Drawn::Glass(None),
             Some(CutFlag::None) => Drawn::Whole,
             Some(CutFlag::Plane(plane)) => Drawn::Open(half_towards_eye(plane, camera)),
             Some(CutFlag::Auto) | None => out_of_the_way(camera, name, mesh, &self.samples),

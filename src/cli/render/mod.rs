@@ -1,11 +1,11 @@
-//! `rfm render`: pictures and films of the frames that `rfm run` wrote, and pictures of solids.
+//! `rfm render`: pictures and films of the frames that `rfm run` wrote, and of solids.
 //!
 //! | file | what it does |
 //! |---|---|
 //! | `options` | the flags, with the help that teaches them |
 //! | `scene` | the folder of a run → a picture of each frame |
 //! | `bodies` | its obstacles, and how each of them is drawn |
-//! | `solid` | an obstacle file → one picture |
+//! | `solid` | an obstacle file → one picture, or a film of what moves |
 //! | `film` | pictures → .png files, .gif, .apng |
 //! | `ffmpeg` | pictures → .mp4, .webm |
 //!

@@ -6,6 +6,8 @@ use clap::builder::{PossibleValuesParser, TypedValueParser};
 use clap::{Args, ValueEnum};
 use glam::DVec3;
 
+use super::film::{Kind, Target};
+use crate::cli::failure::Failure;
 use crate::cli::values::{
     CameraFlag, CutFlag, Frames, camera, count, cut, frames, point, range, seconds, size, times, zoom,
 };
@@ -38,7 +40,8 @@ impl Surface {
                         By pressure, fixed range:    rfm render out -o p.gif --by pressure --range 0..5000\n\
                         The surface of the water:    rfm mesh out --fluid, then rfm render out -o water.gif --surface=opaque\n\
                         Through a clear vessel:      rfm render out -o bowl.png --frames 40 --glass bowl\n\
-                        A solid:                     rfm render examples/pawn.rfm -o pawn.png\n\n\
+                        A solid:                     rfm render examples/pawn.rfm -o pawn.png\n\
+                        A solid that moves:          rfm render examples/paddle.rfm -o paddle.gif --times 0..2\n\n\
                         The folder is that of `rfm run`, finished or not: its frames, obstacle.vtp and summary.json are read, so \
                         nothing is computed again. All pictures of a command have one camera, one range of colours and the same \
                         cut. .png, .gif and .apng are built in and have the same bytes for any number of threads; .mp4 and .webm \
@@ -97,14 +100,15 @@ pub(in crate::cli) struct Render {
     /// Only these frames, counted from 0; B is the first that is left out [default: all]
     #[arg(long, help_heading = "Runs", value_name = "A..B", value_parser = frames)]
     pub frames: Option<Frames>,
-    /// Only frames of these times, in seconds or with units: 0.5..2, 500ms..
-    #[arg(long, help_heading = "Runs", value_name = "A..B", value_parser = times, conflicts_with = "frames", allow_hyphen_values = true)]
+    /// Only frames of these times, in seconds or with units: 0.5..2, 500ms..; the times of a film of a solid
+    /// [default: all, 0..2 of a solid]
+    #[arg(long, value_name = "A..B", value_parser = times, conflicts_with = "frames", allow_hyphen_values = true)]
     pub times: Option<(f64, f64)>,
     /// Only every n-th of them
     #[arg(long, help_heading = "Runs", value_name = "N", value_parser = count)]
     pub every: Option<usize>,
-    /// Pictures in a second of a film [default: 25]
-    #[arg(long, help_heading = "Runs", value_name = "N", value_parser = clap::value_parser!(u32).range(1..=240))]
+    /// Pictures in a second of a film, and of the motion of a solid [default: 25]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=240))]
     pub fps: Option<u32>,
     /// The solid [default: the only one, or the first obstacle of the scene]
     #[arg(short, long, help_heading = "Solids", value_name = "NAME")]
@@ -117,7 +121,19 @@ pub(in crate::cli) struct Render {
     pub mesh_cells: Option<usize>,
 }
 
+/// Pictures in a second of a film.
+const RATE: u32 = 25;
+
 impl Render {
+    /// Where the pictures go.
+    ///
+    /// # Errors
+    /// The name tells no kind of pictures.
+    pub(super) fn target(&self, path: PathBuf) -> Result<Target, Failure> {
+        let kind = Kind::of(&path)?;
+        Ok(Target { path, kind, size: self.size, rate: self.fps.unwrap_or(RATE) })
+    }
+
     /// The first flag that is given and means something for runs alone.
     pub fn flag_of_runs(&self) -> Option<&'static str> {
         let given = [
@@ -128,10 +144,14 @@ impl Render {
             ("--range", self.range.is_some()),
             ("--colours", self.colours.is_some()),
             ("--frames", self.frames.is_some()),
-            ("--times", self.times.is_some()),
             ("--every", self.every.is_some()),
-            ("--fps", self.fps.is_some()),
         ];
+        given.into_iter().find(|(_, given)| *given).map(|(flag, _)| flag)
+    }
+
+    /// The first flag that is given and means nothing for one picture.
+    pub fn flag_of_films(&self) -> Option<&'static str> {
+        let given = [("--times", self.times.is_some()), ("--fps", self.fps.is_some())];
         given.into_iter().find(|(_, given)| *given).map(|(flag, _)| flag)
     }
 

@@ -7,7 +7,7 @@ use std::time::Instant;
 use glam::DVec3;
 
 use super::bodies::{Bodies, bodies_of};
-use super::film::{Kind, Target};
+use super::film::Target;
 use super::options::{Render, Surface};
 use super::solid::camera;
 use crate::cli::args::Shared;
@@ -26,9 +26,6 @@ use rfm::mesh::Mesh;
 use rfm::render::{Backdrop, Caption, Cut, Image, Legend, MeshView, Moving, ParticlesView, Scale};
 use rfm::view::{Array, Levels};
 
-/// Pictures in a second of a film.
-const RATE: u32 = 25;
-
 pub(super) fn run(shared: &Shared, options: &Render) -> Result<(), Failure> {
     let folder = options.subject.as_path();
     if let Some(flag) = options.flag_of_solids() {
@@ -38,14 +35,13 @@ pub(super) fn run(shared: &Shared, options: &Render) -> Result<(), Failure> {
         )));
     }
     let path = options.output.clone().unwrap_or_else(|| folder.join("render"));
-    let kind = Kind::of(&path)?;
-    if options.fps.is_some() && !kind.is_film() {
+    let target = options.target(path)?;
+    if options.fps.is_some() && !target.kind.is_film() {
         return Err(Failure::usage(format!(
             "--fps is for films, and `{}` is none: name a .gif, .apng, .mp4 or .webm",
-            path.shown()
+            target.path.shown()
         )));
     }
-    let target = Target { path, kind, size: options.size, rate: options.fps.unwrap_or(RATE) };
     let run = RunScene::open(folder, options)?;
     target.check(run.entries.len())?;
     let started = Instant::now();

@@ -1,8 +1,10 @@
-//! A picture of a solid.
+//! A picture of a solid, or a film of one that moves.
 
 use std::path::{Path, PathBuf};
 
-use super::film::Kind;
+use rayon::prelude::*;
+
+use super::film::{Kind, Target};
 use super::options::Render;
 use crate::cli::args::Shared;
 use crate::cli::failure::Failure;
@@ -11,11 +13,20 @@ use crate::cli::run::bodies::Bodies;
 use crate::cli::scenery::{self, Drawn, half_towards_eye};
 use crate::cli::values::CutFlag;
 use crate::cli::{choose, input, output};
+use rfm::Solid;
+use rfm::field::Points;
+use rfm::geom::Aabb;
 use rfm::mesh::Mesh;
-use rfm::render::{Camera, Legend};
+use rfm::render::{Backdrop, Camera, Caption, Image, Legend, Moving, ParticlesView};
 
 /// Cells of the mesh along the longest side, unless others are asked for.
 const CELLS: usize = 128;
+
+/// The end of a film for which no times are stated, s.
+const END: f64 = 2.0;
+
+/// The most pictures of a film of a solid.
+const MOST_PICTURES: f64 = 100_000.0;
 
 pub(super) fn run(shared: &Shared, options: &Render) -> Result<(), Failure> {
     let path = options.subject.as_path();
@@ -27,22 +38,128 @@ pub(super) fn run(shared: &Shared, options: &Render) -> Result<(), Failure> {
         )));
     }
     let program = input::program(shared, path)?;
-    let solid = choose::solid_at(shared, &program, options.solid.as_deref(), options.time.unwrap_or(0.0))?;
-    let name = solid.name().to_string();
-    let target = options.output.clone().unwrap_or_else(|| PathBuf::from(format!("{name}.png")));
-    if Kind::of(&target)? != Kind::Png {
+    let solid = choose::solid(shared, &program, options.solid.as_deref())?;
+    let path = options.output.clone().unwrap_or_else(|| PathBuf::from(format!("{}.png", solid.name())));
+    let target = options.target(path)?;
+    match target.kind {
+        Kind::Png => picture(shared, options, &solid, &target),
+        Kind::Folder | Kind::Gif | Kind::Apng | Kind::Mp4 | Kind::Webm => {
+            film(shared, options, &solid, &target)
+        }
+    }
+}
+
+fn picture(shared: &Shared, options: &Render, solid: &Solid, target: &Target) -> Result<(), Failure> {
+    if let Some(flag) = options.flag_of_films() {
         return Err(Failure::usage(format!(
-            "`{}`: a solid is one picture, a .png; films and folders are for the frames of a run",
-            target.shown()
+            "{flag} is for films, and `{}` is one picture: --time T chooses its time, and a .gif, .apng, .mp4 or .webm or a \
+             folder holds many",
+            target.path.shown()
         )));
     }
-    let Some(bounds) = solid.bounds().aabb() else {
-        return Err(Failure::usage(format!(
-            "`{name}` is empty, or could not be proven to end: there is nothing to show"
-        )));
+    let solid = choose::at(solid, options.time.unwrap_or(0.0));
+    let name = solid.name().to_string();
+    let domain = room(std::slice::from_ref(&solid))?;
+    let mesh = mesh(solid, domain, options)?;
+    let (camera, drawn) = seen(options, &domain)?;
+    let title = title(options, &name, drawn);
+    let legend = Legend { title: &title, scale: None };
+    let image = scenery::backdrop(&camera, &domain, &legend, std::iter::once((drawn, &mesh)))?.still();
+    output::write(&target.path, |mut out| image.write_png(&mut out))?;
+    let (width, height) = options.size;
+    if shared.json {
+        return output::json(&serde_json::json!({
+            "schema": 1, "file": target.path.display().to_string(), "solid": name, "width": width, "height": height,
+            "triangles": mesh.triangles.len(),
+        }));
+    }
+    say!("{name}: {width} × {height} pixels, {} triangles", mesh.triangles.len());
+    say!("written to {}", target.path.shown());
+    Ok(())
+}
+
+fn film(shared: &Shared, options: &Render, solid: &Solid, target: &Target) -> Result<(), Failure> {
+    let name = solid.name();
+    let refuse = |reason: String| Err(Failure::usage(format!("`{}`: {reason}", target.path.shown())));
+    if !solid.moves() {
+        return refuse(format!(
+            "`{name}` does not move, and is one picture, a .png; films and folders are for what moves and for the frames of \
+             a run"
+        ));
+    }
+    if options.time.is_some() {
+        return refuse("--time is for one picture; --times A..B are those of a film".into());
+    }
+    let times = instants(options.times, target.rate)?;
+    let moments: Vec<Solid> = times.iter().map(|time| solid.at(*time)).collect();
+    let domain = room(&moments)?;
+    let (camera, drawn) = seen(options, &domain)?;
+    let title = title(options, name, drawn);
+    let legend = Legend { title: &title, scale: None };
+    let still = Backdrop::new(camera, &domain, &[], &legend).map_err(Failure::usage)?;
+    let picture = |k: usize| -> Result<Image, Failure> {
+        let mesh = mesh(moments[k].clone(), domain, options)?;
+        let bodies = scenery::sharp(&domain, std::iter::once((drawn, &mesh)));
+        let particles = ParticlesView { positions: Points::new(&[], &[], &[]), values: &[], radius: 0.0 };
+        let moving = Moving { meshes: &scenery::views(&bodies), particles, balls: false };
+        Ok(still.frame_with(&moving, &Caption { time: times[k], step: None }))
     };
-    let domain = bounds.grown(1e-3 * bounds.size().max_element());
-    let camera = camera(options, &domain)?;
+    target.check(times.len())?;
+    target.write(&(0..times.len()).collect::<Vec<_>>(), &picture)?;
+    let (width, height) = options.size;
+    if shared.json {
+        return output::json(&serde_json::json!({
+            "schema": 1, "output": target.path.display().to_string(), "solid": name, "pictures": times.len(),
+            "width": width, "height": height,
+        }));
+    }
+    let (first, last) = (times[0], times[times.len() - 1]);
+    say!("{name}: {} pictures of {width} × {height}, from {first} s to {last} s", times.len());
+    say!("written to {}", target.path.shown());
+    Ok(())
+}
+
+/// The instants of a film, s.
+fn instants(times: Option<(f64, f64)>, rate: u32) -> Result<Vec<f64>, Failure> {
+    let (from, to) = times.unwrap_or((0.0, END));
+    if !to.is_finite() {
+        return Err(Failure::usage("--times: a solid moves for ever; state the end, as in 0..2"));
+    }
+    let from = if from.is_finite() { from } else { 0.0_f64.min(to) };
+    // sums of steps are not exact
+    let count = ((to - from) * f64::from(rate) * (1.0 + 1e-12)).floor() + 1.0;
+    if count > MOST_PICTURES {
+        return Err(Failure::usage(format!(
+            "--times: {count:.0} pictures, and {MOST_PICTURES:.0} is the most"
+        )));
+    }
+    Ok((0..count as u64).map(|k| from + k as f64 / f64::from(rate)).collect())
+}
+
+/// A box around a solid at all these times.
+fn room(moments: &[Solid]) -> Result<Aabb, Failure> {
+    let bounds: Vec<Option<Aabb>> = moments.par_iter().map(|solid| solid.bounds().aabb()).collect();
+    // a solid may be empty for a while
+    let room = bounds
+        .into_iter()
+        .flatten()
+        .reduce(|all, next| Aabb::new(all.min.min(next.min), all.max.max(next.max)));
+    let room = room.ok_or_else(|| {
+        let name = moments[0].name();
+        Failure::usage(format!("`{name}` is empty, or could not be proven to end: there is nothing to show"))
+    })?;
+    Ok(room.grown(1e-3 * room.size().max_element()))
+}
+
+fn mesh(solid: Solid, domain: Aabb, options: &Render) -> Result<Mesh, Failure> {
+    let time = solid.time();
+    let bodies = Bodies::of(vec![solid], domain, options.mesh_cells.unwrap_or(CELLS));
+    Ok(Mesh::joined(&bodies.meshes_at(time)?))
+}
+
+/// From where a solid is seen, and how it is drawn.
+fn seen(options: &Render, domain: &Aabb) -> Result<(Camera, Drawn), Failure> {
+    let camera = camera(options, domain)?;
     let drawn = match &options.cut {
         None | Some(CutFlag::None) => Drawn::Whole,
         Some(CutFlag::Plane(plane)) => Drawn::Open(half_towards_eye(plane, &camera)),
@@ -52,31 +169,21 @@ pub(super) fn run(shared: &Shared, options: &Render) -> Result<(), Failure> {
             ));
         }
     };
-    let bodies = Bodies::of(vec![solid], domain, options.mesh_cells.unwrap_or(CELLS));
-    let mesh = Mesh::joined(&bodies.meshes_at(0.0)?);
+    Ok((camera, drawn))
+}
+
+/// The text over the pictures.
+fn title(options: &Render, name: &str, drawn: Drawn) -> String {
+    let path = options.subject.as_path();
     let file = path.file_name().filter(|_| path != Path::new("-"));
     let file = file.map_or_else(|| "standard input".into(), |name| Path::new(name).shown());
-    let title = options.title.clone().unwrap_or_else(|| {
-        let cut = scenery::described(&[&name], &[drawn]);
-        [vec![file, name.clone()], cut].concat().join(" · ")
-    });
-    let legend = Legend { title: &title, scale: None };
-    let image = scenery::backdrop(&camera, &domain, &legend, std::iter::once((drawn, &mesh)))?.still();
-    output::write(&target, |mut out| image.write_png(&mut out))?;
-    let (width, height) = options.size;
-    if shared.json {
-        return output::json(&serde_json::json!({
-            "schema": 1, "file": target.display().to_string(), "solid": name, "width": width, "height": height,
-            "triangles": mesh.triangles.len(),
-        }));
-    }
-    say!("{name}: {width} × {height} pixels, {} triangles", mesh.triangles.len());
-    say!("written to {}", target.shown());
-    Ok(())
+    options.title.clone().unwrap_or_else(|| {
+        [vec![file, name.to_string()], scenery::described(&[name], &[drawn])].concat().join(" · ")
+    })
 }
 
 /// The camera that the flags ask for.
-pub(super) fn camera(options: &Render, domain: &rfm::geom::Aabb) -> Result<Camera, Failure> {
+pub(super) fn camera(options: &Render, domain: &Aabb) -> Result<Camera, Failure> {
     if options.look_at.is_some_and(|at| !at.is_finite()) {
         return Err(Failure::usage("--look-at: expected three finite lengths"));
     }

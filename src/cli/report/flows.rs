@@ -10,13 +10,14 @@ use std::time::Instant;
 use anstream::println;
 use serde::Serialize;
 
-use super::super::args::{Report, Shared};
+use super::super::args::Shared;
 use super::super::run::bodies::Bodies;
 use super::super::run::pictures::{Look, Pictures};
 use super::super::stopwatch::processor_seconds;
 use super::super::{Failure, choose, input, output, progress};
 use super::flow_plot;
 use super::flow_run::FlowRun;
+use super::options::Report;
 use super::page::{Figure, Page};
 use super::table::{self, Column};
 use crate::cli::output::Shown;

@@ -244,7 +244,7 @@ fn opened(look: Look<'_>, experiment: &Experiment, meshes: &[Mesh]) -> Result<Ve
     let samples = if fixed.is_none() { fluid_samples(experiment) } else { Vec::new() };
     let drawn = |(name, mesh): (&&str, &Mesh)| match fixed {
         _ if is_hidden(name) => Drawn::Hidden,
-        _ if is_glass(name) => Drawn::Glass,
+        _ if is_glass(name) => Drawn::Glass(fixed.flatten()),
         Some(None) => Drawn::Whole,
         Some(Some(cut)) => Drawn::Open(cut),
         None => out_of_the_way(&small, name, mesh, &samples),

@@ -2,7 +2,8 @@
 
 use std::path::{Path, PathBuf};
 
-use super::super::args::{Check, Mesh, MessageFormat, Report, Run, Shared};
+use super::super::args::{Check, Mesh, MessageFormat, Run, Shared};
+use super::super::report::Report;
 use super::super::{Failure, check as checks, choose, input, mesh as meshes, report as reports, run as runs};
 use super::figures::Command;
 use super::options::SweepOptions;

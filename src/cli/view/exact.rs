@@ -2,7 +2,8 @@
 
 use serde::Serialize;
 
-use super::model::{Checked, refused};
+use super::messages::refused;
+use super::model::Checked;
 use rfm::source::{self, Param};
 use rfm::{Engine, Program, Solid};
 

@@ -5,11 +5,11 @@
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
-use super::super::args::View;
 use super::super::failure::Failure;
 use super::super::output::counted;
 use super::super::saved::{self, RunFigures};
 use super::super::survey::{Survey, is_velocity};
+use super::options::View;
 use super::plots;
 use rfm::fluid_surface::{FrameEntry, read_arrays, read_mesh};
 use rfm::mesh::split_creases;
@@ -50,6 +50,7 @@ impl SavedRun {
             title: saved::title(folder),
             facts: facts(&entries, &survey, figures.as_ref()),
             live: false,
+            moves: false,
             domain: Corners::from(&domain),
             lattice: Some(Corners::from(lattice.bounds())),
             radius: survey.radius(figures.as_ref(), entries.len()),

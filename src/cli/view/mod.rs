@@ -3,19 +3,24 @@
 //!
 //! | file | what it does |
 //! |---|---|
+//! | `options` | the flags, with the help that teaches them |
 //! | `folder` | the folder of a run → a page with its frames |
 //! | `plots` | energy, audit and probes over time, of a folder or of a simulation that goes on |
 //! | `section` | ω in a plane |
 //! | `server`, `request`, `stream` | the page and its stream at an address with a token |
 //! | `board` | the newest of everything that pages are told |
-//! | `session`, `model`, `command` | the simulation on its own thread, and what pages ask of it |
+//! | `session`, `model`, `course`, `command` | what goes on in time on its own thread, and what pages ask of it |
+//! | `messages` | what went wrong, as text |
 
 mod board;
 mod browser;
 mod command;
+mod course;
 mod exact;
 mod folder;
+mod messages;
 mod model;
+mod options;
 mod plots;
 mod request;
 mod section;
@@ -26,12 +31,13 @@ mod stream;
 use std::path::Path;
 use std::sync::Arc;
 
-use super::args::{Shared, View};
+use super::args::Shared;
 use super::failure::{Failure, note};
 use super::{input, output};
 use crate::cli::output::Shown;
 use board::Board;
 use folder::SavedRun;
+pub(super) use options::View;
 use server::{Content, Server};
 use session::Session;
 

@@ -4,27 +4,22 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::time::SystemTime;
 
-use glam::DVec3;
-
-use super::super::args::{Shared, View};
+use super::super::args::Shared;
 use super::super::choose;
-use super::super::failure::Failure;
 use super::super::input;
 use super::super::run::bodies::Bodies;
-use super::plots::History;
+use super::super::way::Way;
+use super::course::{Course, Flow, Motion, mesh_at};
+use super::messages::{message, plain, refused};
+use super::options::View;
 use crate::cli::output::Shown;
 use rfm::compile::files_beside;
-use rfm::diagnostic::{Diagnostics, Style, render};
 use rfm::files::Files;
 use rfm::geom::Aabb;
 use rfm::lower::{Gravity, Options, Scene};
-use rfm::mesh::{Mesh, split_creases};
 use rfm::quantity::Dimension;
-use rfm::sph::Simulation;
-use rfm::view::{
-    Array, Corners, Frame, FrameHead, Lattice, Levels, Param, Setting, VELOCITY, pack_frame, pack_mesh,
-};
-use rfm::{Engine, Error, Experiment, Program, Solid};
+use rfm::view::{Array, Corners, Levels, Param, Setting, VELOCITY};
+use rfm::{Engine, Experiment, Program, Solid};
 
 /// What is viewed, as the command line states it.
 pub(super) struct Subject {
@@ -53,15 +48,6 @@ pub(super) struct Standing {
     pub mesh: Vec<u8>,
     pub solids: Vec<Solid>,
     pub domain: Aabb,
-}
-
-/// A simulation with what is drawn of its scene.
-pub(super) struct Running {
-    pub simulation: Simulation,
-    pub experiment: Experiment,
-    pub history: History,
-    bodies: Bodies,
-    lattice: Lattice,
 }
 
 /// How fine a mesh is.
@@ -144,17 +130,23 @@ impl Subject {
         Ok(Checked { program, scene, solid: self.solid.clone() })
     }
 
-    /// All that stands in the fluid's way at the start, or the solid.
+    /// All that stands in the fluid's way at a time, s, or the solid.
     ///
     /// # Errors
     /// Why there is no mesh.
-    pub fn standing(&self, checked: &Checked, detail: Detail, run: u64) -> Result<Standing, String> {
+    pub fn standing(
+        &self,
+        checked: &Checked,
+        detail: Detail,
+        time: f64,
+        run: u64,
+    ) -> Result<Standing, String> {
         let (solids, domain) = match &checked.scene {
             Some(scene) => (self.solids_of(checked, scene)?, scene.domain),
             None => {
                 let solid = self.solid_of(checked)?;
-                let domain = around(&solid)?;
-                (vec![solid], domain)
+                let room = Way::of(&solid)?.room;
+                (vec![solid], room)
             }
         };
         let cells = match detail {
@@ -162,8 +154,7 @@ impl Subject {
             Detail::Lasting => self.cells,
         };
         let bodies = Bodies::of(solids, domain, cells);
-        let meshes = bodies.meshes_at(0.0).map_err(message)?;
-        let mesh = pack_mesh(&split_creases(&Mesh::joined(&meshes)), 0.0, run);
+        let mesh = mesh_at(&bodies, time, run)?;
         Ok(Standing { mesh, solids: bodies.solids().to_vec(), domain })
     }
 
@@ -174,7 +165,7 @@ impl Subject {
     pub fn domain(&self, checked: &Checked) -> Result<Aabb, String> {
         match &checked.scene {
             Some(scene) => Ok(scene.domain),
-            None => around(&self.solid_of(checked)?),
+            None => Ok(Way::of(&self.solid_of(checked)?)?.room),
         }
     }
 
@@ -199,22 +190,28 @@ impl Subject {
     ///
     /// # Errors
     /// The messages, as the command line shows them.
-    pub fn start(&self, checked: &Checked, scene: &Scene) -> Result<Running, String> {
+    pub fn start(&self, checked: &Checked, scene: &Scene) -> Result<Course, String> {
         let experiment = Experiment::new(&checked.program, &scene.name, self.engine).map_err(refused)?;
-        let mut simulation = experiment.start().map_err(refused)?.simulation;
-        let history = History::start(&mut simulation, scene);
-        let solids = experiment.bodies().iter().map(|body| body.solid.clone()).collect();
-        let domain = experiment.domain();
-        let bodies = Bodies::of(solids, domain, self.cells);
-        Ok(Running { simulation, history, bodies, lattice: Lattice::new(&domain), experiment })
+        Ok(Course::Fluid(Box::new(Flow::start(experiment, self.cells)?)))
+    }
+
+    /// The way of the solid from a time on, s; `None` if it stands still.
+    ///
+    /// # Errors
+    /// Why there is nothing to show.
+    pub fn motion(&self, checked: &Checked, time: f64) -> Result<Option<Course>, String> {
+        let solid = self.solid_of(checked)?;
+        let way = Way::of(&solid)?;
+        Ok((way.end > 0.0).then(|| Course::Solid(Motion::of(solid, way, time, self.cells))))
     }
 
     /// What a page shows besides frames and meshes.
-    pub fn setting(&self, checked: Option<&Checked>, bounds: &Aabb, running: Option<&Running>) -> Setting {
+    pub fn setting(&self, checked: Option<&Checked>, bounds: &Aabb, course: Option<&Course>) -> Setting {
         let scene = checked.and_then(|checked| checked.scene.as_ref());
-        let facts = match (checked, scene, running) {
-            (_, Some(scene), Some(running)) => {
-                let particles = running.simulation.particles().len();
+        let flow = course.and_then(Course::flow);
+        let facts = match (checked, scene, flow) {
+            (_, Some(scene), Some(flow)) => {
+                let particles = flow.simulation.particles().len();
                 format!("scene {} · {} · {particles} particles", scene.name, scene.method.name())
             }
             (_, Some(scene), None) => format!("scene {} · {}", scene.name, scene.method.name()),
@@ -224,7 +221,7 @@ impl Subject {
             }
             (None, None, _) => String::new(),
         };
-        let fastest = running.map(|running| Levels { low: 0.0, high: running.experiment.speed_scale() });
+        let fastest = flow.map(|flow| Levels { low: 0.0, high: flow.experiment.speed_scale() });
         let [x, y, z] = VELOCITY;
         let arrays = ["speed", "density", "pressure", x, y, z].map(|name| {
             Array::named(name, fastest.filter(|range| name == "speed" && range.high.is_finite()))
@@ -234,25 +231,18 @@ impl Subject {
             facts,
             live: true,
             domain: Corners::from(bounds),
-            lattice: running.map(|running| Corners::from(running.lattice.bounds())),
-            radius: running.map_or(0.0, |running| 0.5 * running.experiment.parameters().spacing()),
+            moves: matches!(course, Some(Course::Solid(_))),
+            lattice: flow.map(|flow| Corners::from(flow.lattice.bounds())),
+            radius: flow.map_or(0.0, |flow| 0.5 * flow.experiment.parameters().spacing()),
             arrays: if scene.is_some() { arrays.to_vec() } else { Vec::new() },
             gravity: scene.and_then(|scene| match &scene.gravity {
                 Gravity::Still(gravity) => Some(gravity.to_array()),
                 Gravity::Turning(_) | Gravity::Field(_) => None,
             }),
             params: checked.map_or_else(Vec::new, params),
-            plots: running.is_none().then(Vec::new),
+            plots: flow.is_none().then(Vec::new),
         }
     }
-}
-
-/// The box in which a solid is shown.
-fn around(solid: &Solid) -> Result<Aabb, String> {
-    let bounds = solid.bounds().aabb().ok_or_else(|| {
-        format!("`{}` is empty, or could not be proven to end: there is nothing to show", solid.name())
-    })?;
-    Ok(bounds.grown(1e-3 * bounds.size().max_element()))
 }
 
 impl Checked {
@@ -276,72 +266,4 @@ fn params(checked: &Checked) -> Vec<Param> {
         }
     });
     shown.collect()
-}
-
-impl Running {
-    /// Begins again.
-    ///
-    /// # Errors
-    /// Why that is not possible; the run is as it was then.
-    pub fn restart(&mut self) -> Result<(), String> {
-        self.simulation = self.experiment.start().map_err(refused)?.simulation;
-        self.history = History::start(&mut self.simulation, self.experiment.scene());
-        Ok(())
-    }
-
-    /// Whether any obstacle moves by itself.
-    pub fn moves(&self) -> bool {
-        self.bodies.move_about()
-    }
-
-    /// The block of the obstacles' mesh as they stand now.
-    pub fn mesh(&self, run: u64) -> Result<Vec<u8>, String> {
-        let time = self.simulation.time();
-        let meshes = self.bodies.meshes_at(time).map_err(message)?;
-        Ok(pack_mesh(&split_creases(&Mesh::joined(&meshes)), time, run))
-    }
-
-    /// The block of the present instant.
-    pub fn frame(&self, run: u64) -> Vec<u8> {
-        let particles = self.simulation.particles();
-        // by their ids, so that the page can follow each of them
-        let order = particles.order_by_id();
-        let column = |of: &dyn Fn(usize) -> f64| order.iter().map(|&i| of(i)).collect::<Vec<f64>>();
-        let velocity = &particles.velocity;
-        let arrays = [
-            column(&|i| velocity.get(i).length()),
-            column(&|i| particles.density[i]),
-            column(&|i| particles.pressure[i]),
-            column(&|i| velocity.x[i]),
-            column(&|i| velocity.y[i]),
-            column(&|i| velocity.z[i]),
-        ];
-        let places = order.iter().map(|&i| particles.position.get(i));
-        let (frame, ranges) = Frame::of(&self.lattice, places, &arrays.each_ref().map(Vec::as_slice));
-        let (time, step) = (self.simulation.time(), Some(self.simulation.steps()));
-        pack_frame(&FrameHead { time, step, ranges, mesh: None, run, motion: None }, &frame, None)
-    }
-
-    /// Lets gravity act in this direction from now on, m/s².
-    pub fn set_gravity(&mut self, gravity: DVec3) {
-        self.simulation.set_turning_gravity(std::sync::Arc::new(move |_| gravity));
-    }
-}
-
-fn plain(diagnostics: &Diagnostics) -> String {
-    render(diagnostics, Style::Plain)
-}
-
-pub(super) fn refused(error: Error) -> String {
-    match error {
-        Error::Diagnostics(diagnostics) => plain(&diagnostics),
-        other => other.to_string(),
-    }
-}
-
-fn message(failure: Failure) -> String {
-    match failure {
-        Failure::Usage(message) | Failure::Numerical(message) => message,
-        Failure::Findings | Failure::Interrupted | Failure::ClosedPipe => "the file has mistakes".into(),
-    }
 }

@@ -10,12 +10,14 @@ use std::time::{Duration, Instant};
 
 use glam::DVec3;
 
-use super::super::args::{Shared, View};
+use super::super::args::Shared;
 use super::super::failure::Failure;
 use super::board::{Board, Status, Topic};
 use super::command::{Command, settled};
+use super::course::Course;
 use super::exact::Field;
-use super::model::{Checked, Detail, Running, Stamp, Standing, Subject};
+use super::model::{Checked, Detail, Stamp, Standing, Subject};
+use super::options::View;
 use super::section;
 use rfm::Solid;
 use rfm::geom::Aabb;
@@ -33,9 +35,6 @@ const PLOTS: Duration = Duration::from_millis(250);
 /// Pause of a simulation that is ahead of the clock.
 const BREATH: Duration = Duration::from_millis(4);
 
-/// Most particles of a scene that begins to run by itself.
-const MOST_AT_ONCE: usize = 200_000;
-
 /// A file that is viewed.
 pub(super) struct Session {
     subject: Subject,
@@ -44,7 +43,8 @@ pub(super) struct Session {
     values: BTreeMap<String, f64>,
     stamp: Stamp,
     checked: Option<Checked>,
-    running: Option<Running>,
+    /// What goes on in time; `None` if the file has nothing that does.
+    course: Option<Course>,
     status: Status,
     /// What stands in the scene as it is shown, and the box around it.
     standing: Option<(Vec<Solid>, Aabb)>,
@@ -86,7 +86,7 @@ impl Session {
             values: BTreeMap::new(),
             stamp: None,
             checked: None,
-            running: None,
+            course: None,
             status: Status { speed: 1.0, ..Status::default() },
             standing: None,
             plane: None,
@@ -116,8 +116,7 @@ impl Session {
     fn go(mut self, commands: &Receiver<Command>) {
         self.stamp = self.subject.stamp();
         self.load();
-        let particles = self.running.as_ref().map_or(0, |running| running.simulation.particles().len());
-        self.status.playing = (1..=MOST_AT_ONCE).contains(&particles);
+        self.status.playing = self.course.as_ref().is_some_and(Course::begins_by_itself);
         self.tell();
         let mut looked = Instant::now();
         let mut waited = false;
@@ -155,7 +154,10 @@ impl Session {
     fn obey(&mut self, command: Command) {
         match command {
             Command::Play => {
-                self.status.playing = self.running.is_some();
+                if self.course.as_ref().is_some_and(Course::has_ended) {
+                    self.restart();
+                }
+                self.status.playing = self.course.is_some();
                 self.follow_clock();
             }
             Command::Pause => {
@@ -165,7 +167,7 @@ impl Session {
             }
             Command::Step => {
                 self.status.playing = false;
-                self.steps(|_| true);
+                self.steps(self.frame_time(), |_| true);
             }
             Command::Restart => self.restart(),
             Command::Reset => {
@@ -187,7 +189,7 @@ impl Session {
                 let gravity = DVec3::from_array(vector);
                 if gravity.is_finite() {
                     self.gravity = Some(gravity);
-                    self.running.iter_mut().for_each(|running| running.set_gravity(gravity));
+                    self.course.iter_mut().for_each(|course| course.set_gravity(gravity));
                 }
             }
             Command::Slice { axis, at } => {
@@ -233,16 +235,17 @@ impl Session {
     fn show_mesh(&mut self, values: &BTreeMap<String, f64>, detail: Detail) -> Option<(Checked, Aabb)> {
         let began = Instant::now();
         let made = self.subject.checked(values).and_then(|checked| {
-            let made = self.subject.standing(&checked, detail, self.run)?;
-            Ok((checked, made))
+            let time = if checked.scene.is_some() { 0.0 } else { self.time() };
+            let made = self.subject.standing(&checked, detail, time, self.run)?;
+            Ok((checked, made, time))
         });
         match made {
-            Ok((checked, Standing { mesh, solids, domain })) => {
+            Ok((checked, Standing { mesh, solids, domain }, time)) => {
                 self.board.set_block(Topic::Mesh, mesh);
                 self.pace.mesh.time = f64::NAN;
                 self.status.error = None;
                 self.standing = Some((solids, domain));
-                self.show_slice(0.0);
+                self.show_slice(time);
                 self.status.latency =
                     Some(format!("the obstacle followed in {:.0} ms", began.elapsed().as_secs_f64() * 1e3));
                 Some((checked, domain))
@@ -263,15 +266,18 @@ impl Session {
         let values = self.values.clone();
         let Some((checked, bounds)) = self.show_mesh(&values, Detail::Lasting) else {
             // a file that was never right has no picture that could remain
-            self.status.playing &= self.running.is_some();
+            self.status.playing &= self.course.is_some();
             return;
         };
         let standing = self.standing.as_ref().map_or(&[][..], |(solids, _)| solids);
         self.board.set_field(&Field::of(&checked, standing));
-        let running = checked.scene.as_ref().map(|scene| self.subject.start(&checked, scene)).transpose();
-        match running {
-            Ok(running) => {
-                self.running = running;
+        let course = match &checked.scene {
+            Some(scene) => self.subject.start(&checked, scene).map(Some),
+            None => self.subject.motion(&checked, self.time()),
+        };
+        match course {
+            Ok(course) => {
+                self.course = course;
                 self.checked = Some(checked);
                 self.begin(&bounds);
             }
@@ -290,12 +296,12 @@ impl Session {
 
     /// Begins the present experiment again.
     fn restart(&mut self) {
-        let Some(running) = &mut self.running else { return };
-        match running.restart() {
+        let Some(course) = &mut self.course else { return };
+        match course.restart() {
             Ok(()) => {
                 self.status.error = None;
-                let bounds = running.experiment.domain();
-                self.begin(&bounds);
+                let room = course.room();
+                self.begin(&room);
             }
             Err(error) => self.status.error = Some(error),
         }
@@ -304,15 +310,15 @@ impl Session {
     /// Shows the first instant of a run.
     fn begin(&mut self, bounds: &Aabb) {
         self.run += 1;
-        if self.running.is_none() {
+        if self.course.as_ref().and_then(Course::flow).is_none() {
             // of a fluid that the file no longer has
             self.board.clear(Topic::Frame);
             self.board.clear(Topic::Plots);
             self.status.text.clear();
         }
-        self.board.set_setting(self.subject.setting(self.checked.as_ref(), bounds, self.running.as_ref()));
-        if let (Some(running), Some(gravity)) = (&mut self.running, self.gravity) {
-            running.set_gravity(gravity);
+        self.board.set_setting(self.subject.setting(self.checked.as_ref(), bounds, self.course.as_ref()));
+        if let (Some(course), Some(gravity)) = (&mut self.course, self.gravity) {
+            course.set_gravity(gravity);
         }
         self.pace.seconds_per_step = 0.0;
         self.pace.mesh.time = f64::NAN;
@@ -327,7 +333,7 @@ impl Session {
 
     /// The simulated time, s.
     fn time(&self) -> f64 {
-        self.running.as_ref().map_or(0.0, |running| running.simulation.time())
+        self.course.as_ref().map_or(0.0, Course::time)
     }
 
     /// Shows ω at a time, s, in the plane that is asked for.
@@ -349,14 +355,23 @@ impl Session {
     }
 
     fn is_ahead(&self) -> bool {
-        self.running.as_ref().is_none_or(|running| running.simulation.time() >= self.due())
+        self.course.as_ref().is_none_or(|course| match course {
+            Course::Fluid(_) => course.time() >= self.due(),
+            // it takes no time to go on, so it does for each picture
+            Course::Solid(_) => course.time() + self.frame_time() > self.due(),
+        })
+    }
+
+    /// The simulated time between pictures, s.
+    fn frame_time(&self) -> f64 {
+        FRAME.as_secs_f64() * self.status.speed
     }
 
     /// Goes on for as long as a frame lasts.
     fn advance(&mut self) {
         let began = Instant::now();
         let due = self.due();
-        self.steps(|time| began.elapsed() >= FRAME || time >= due);
+        self.steps(due - self.time(), |time| began.elapsed() >= FRAME || time >= due);
         if self.time() < due {
             // what could not be computed in time is not made up for later
             self.follow_clock();
@@ -364,25 +379,26 @@ impl Session {
         self.tell();
     }
 
-    /// Takes steps, at least one, until `is_enough` of the simulated time, and shows the instant.
-    fn steps(&mut self, is_enough: impl Fn(f64) -> bool) {
-        let Some(running) = &mut self.running else { return };
+    /// Takes steps, at least one, until `is_enough` of the simulated time, and shows the instant. `by` is the time, s,
+    /// by which something goes on that has no steps of its own.
+    fn steps(&mut self, by: f64, is_enough: impl Fn(f64) -> bool) {
+        let Some(course) = &mut self.course else { return };
         loop {
             let began = Instant::now();
-            if let Err(error) = running.simulation.step() {
-                self.status.error =
-                    Some(format!("the run has ended at {:.4} s: {error}", running.simulation.time()));
+            if let Err(error) = course.step(by) {
+                self.status.error = Some(error);
                 self.status.playing = false;
                 break;
             }
             let spent = began.elapsed().as_secs_f64();
             let mean = &mut self.pace.seconds_per_step;
             *mean = if *mean > 0.0 { 0.9 * *mean + 0.1 * spent } else { spent };
-            if is_enough(running.simulation.time()) {
+            if is_enough(course.time()) || course.has_ended() {
                 break;
             }
         }
-        running.history.sample(&running.simulation);
+        course.sample();
+        self.status.playing &= !course.has_ended();
         self.show_frame();
         if !self.status.playing || self.pace.plots.elapsed() >= PLOTS {
             self.show_plots();
@@ -391,21 +407,21 @@ impl Session {
 
     /// Shows what is known of the quantities over time.
     fn show_plots(&mut self) {
-        if let Some(running) = &self.running {
-            self.board.set_plots(running.history.plots());
+        if let Some(flow) = self.course.as_ref().and_then(Course::flow) {
+            self.board.set_plots(flow.history.plots());
             self.pace.plots = Instant::now();
         }
     }
 
     /// Shows what moves where it stands now, unless it is shown so already.
     fn show_obstacles(&mut self) {
-        let Some(running) = &self.running else { return };
-        let time = running.simulation.time();
-        if !running.moves() || self.pace.mesh.time == time {
+        let Some(course) = &self.course else { return };
+        let time = course.time();
+        if !course.moves() || self.pace.mesh.time == time {
             return;
         }
         let began = Instant::now();
-        match running.mesh(self.run) {
+        match course.mesh(self.run) {
             Ok(mesh) => self.board.set_block(Topic::Mesh, mesh),
             Err(error) => self.status.error = Some(error),
         }
@@ -419,26 +435,15 @@ impl Session {
         if !self.status.playing || at.elapsed() > 2 * took {
             self.show_obstacles();
         }
-        let Some(running) = &self.running else { return };
-        self.board.set_block(Topic::Frame, running.frame(self.run));
+        let Some(course) = &self.course else { return };
+        self.board.set_block(Topic::Frame, course.frame(self.run));
     }
 
     fn tell(&mut self) {
-        let state = match &self.running {
-            None => String::new(),
-            Some(running) => {
-                let milliseconds = 1e3 * self.pace.seconds_per_step;
-                let speed = if milliseconds > 0.0 {
-                    format!(" · {milliseconds:.1} ms per step")
-                } else {
-                    String::new()
-                };
-                let state = if self.status.playing { "running" } else { "paused" };
-                let found = running.simulation.findings();
-                let found = found.last().map_or_else(String::new, |(_, message)| format!(" · {message}"));
-                format!("{state} · step {}{speed}{found}", running.simulation.steps())
-            }
-        };
+        let state = self.course.as_ref().map_or_else(String::new, |course| {
+            let doing = if self.status.playing { "running" } else { "paused" };
+            format!("{doing}{}", course.details(self.pace.seconds_per_step))
+        });
         if self.checked.is_some() || self.status.error.is_some() {
             self.status.text = state;
         }

@@ -43,11 +43,11 @@ class Viewer {
     byId("facts").textContent = setting.facts;
     this.scene.setBox(setting.box);
     if (setting.plots) this.tellPlots(setting.plots);
-    const hasFluid = setting.arrays.length > 0;
-    byId("transport").hidden = !hasFluid;
-    byId("record").hidden = !window.MediaRecorder || !hasFluid;
-    // a file that has lost its fluid
-    if (!hasFluid && this.timeline.frames.length) {
+    const goesOn = setting.arrays.length > 0 || setting.moves;
+    byId("transport").hidden = !goesOn;
+    byId("record").hidden = !window.MediaRecorder || !goesOn;
+    // a file that has lost its fluid, or the motion of its solid
+    if (!goesOn && this.timeline.frames.length) {
       this.timeline.clear();
       this.timelineChanged();
       this.tellPlots([]);

@@ -133,10 +133,11 @@ class Scene {
     if (look.obstacle === "opaque") this.exact.measure(look, view, projection, look.time, look.values);
     if (this.exact.isShown(look)) this.exact.draw(look, view, projection, look.time, look.values);
     else if (this.solid && look.obstacle === "opaque") this.drawMesh(look, view, projection, 1);
-    if (frames && look.particles) this.drawPoints(look, view, projection, frames);
-    if (frames && look.arrows && look.velocity) this.motion.drawArrows(look, view, projection, frames);
+    const fluid = frames?.from.count > 0;
+    if (fluid && look.particles) this.drawPoints(look, view, projection, frames);
+    if (fluid && look.arrows && look.velocity) this.motion.drawArrows(look, view, projection, frames);
     this.drawLines(look, view, projection);
-    if (frames && look.trails) this.motion.drawTrails(look, view, projection, timeline.frames, look.blended ? timeline.place : Math.floor(timeline.place + 1e-9));
+    if (fluid && look.trails) this.motion.drawTrails(look, view, projection, timeline.frames, look.blended ? timeline.place : Math.floor(timeline.place + 1e-9));
     if (look.slice) this.slice.draw(look.slice, view, projection);
     if (this.solid && look.obstacle === "transparent") this.drawMesh(look, view, projection, 0.3);
   }

@@ -3,6 +3,11 @@
 /** The most bytes of frames that are kept of a run that goes on. */
 const MOST_BYTES = 400e6;
 
+/** The bytes of a frame without particles: that of a solid that moves has none. */
+const LEAST_BYTES = 1000;
+
+const bytesOf = (frame) => LEAST_BYTES + frame.count * (6 + frame.levels.length);
+
 /** The speeds of playback: simulated seconds per second. */
 const SPEEDS = [0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1, 2, 5, 10, 20, 50, 100];
 
@@ -39,7 +44,7 @@ class Timeline {
 
   add(frame) {
     this.frames.push(frame);
-    this.bytes += frame.count * (6 + frame.levels.length);
+    this.bytes += bytesOf(frame);
   }
 
   /** Leaves out every other frame but the last where they take too much room. */
@@ -48,7 +53,7 @@ class Timeline {
     const following = this.place >= this.last;
     const time = this.time;
     this.frames = this.frames.filter((_, k) => k % 2 === 0 || k === this.frames.length - 1);
-    this.bytes = this.frames.reduce((sum, frame) => sum + frame.count * (6 + frame.levels.length), 0);
+    this.bytes = this.frames.reduce((sum, frame) => sum + bytesOf(frame), 0);
     if (following) this.place = this.last;
     else this.seek(time);
   }

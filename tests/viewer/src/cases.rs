@@ -50,6 +50,7 @@ pub const ALL: &[(&str, Case)] = &[
     ("the box turns and gravity stays", live::turned),
     ("a mistake in the file is shown and mended", live::mended),
     ("a solid without a scene", live::solid),
+    ("a solid that moves without a scene", live::moving_solid),
 ];
 
 impl Room {

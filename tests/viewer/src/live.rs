@@ -130,3 +130,34 @@ pub fn solid(room: &mut Room) {
     room.browser.eval("(() => { const track = document.getElementById('param-r'); track.value = 0.1; track.dispatchEvent(new Event('input')); })()");
     room.browser.wait_for("viewer.scene.shown.mesh !== viewer.old");
 }
+
+pub fn moving_solid(room: &mut Room) {
+    let viewer = Viewer::start(&room.folder, &["paddle.rfm", "-s", "stirrer"]);
+    room.browser.open(&viewer.address);
+    // it moves by itself, and keeps a mesh of each instant as far as there is time for it
+    room.browser.wait_for("window.viewer && viewer.run.playing && viewer.timeline.frames.length > 10");
+    assert_eq!(room.browser.eval("document.getElementById('transport').hidden"), false);
+    assert_eq!(room.browser.number("viewer.setting.arrays.length"), 0.0);
+    room.browser.wait_for("viewer.meshes[0].time > 0.3");
+    room.browser.click("#play");
+    room.browser.wait_for("!viewer.run.playing");
+    let same_instant = "viewer.meshes[0].time === viewer.timeline.frames.at(-1).time";
+    room.browser.wait_for(same_instant);
+    let time = room.browser.number("viewer.timeline.frames.at(-1).time");
+    room.browser.click("#forward");
+    room.browser.wait_for(&format!("viewer.timeline.frames.at(-1).time > {time} && {same_instant}"));
+    room.shot("moving-solid");
+    // another value of a param leaves it where it is, and all turns fit into the box
+    let time = room.browser.number("viewer.timeline.frames.at(-1).time");
+    room.browser.eval(
+        "(() => { const track = document.getElementById('param-period'); track.value = 3; \
+         track.dispatchEvent(new Event('change')); })()",
+    );
+    room.browser.wait_for("viewer.setting.params.find((p) => p.name === 'period').value === 3");
+    room.browser.wait_for(same_instant);
+    assert_eq!(room.browser.number("viewer.timeline.frames.at(-1).time"), time);
+    let reach = room.browser.number("viewer.setting.box.max[0]");
+    assert!((0.3..0.33).contains(&reach), "{reach}");
+    room.browser.click("#restart");
+    room.browser.wait_for("viewer.timeline.frames.length === 1 && viewer.timeline.frames[0].time === 0");
+}

@@ -116,6 +116,7 @@ fn page_of_simulation(experiment: &Experiment, simulation: &Simulation, facts: &
         title: experiment.scene().name.clone(),
         facts: facts.to_string(),
         live: false,
+        moves: false,
         domain: Corners::from(&domain),
         lattice: Some(Corners::from(lattice.bounds())),
         radius: 0.5 * experiment.parameters().spacing(),

@@ -1,0 +1,229 @@
+//! What goes on in time: a fluid among its obstacles, or a solid that moves by itself.
+
+use std::sync::Arc;
+
+use glam::DVec3;
+
+use super::super::run::bodies::Bodies;
+use super::super::way::Way;
+use super::messages::{message, refused};
+use super::plots::History;
+use rfm::geom::Aabb;
+use rfm::mesh::{Mesh, split_creases};
+use rfm::sph::Simulation;
+use rfm::view::{Frame, FrameHead, Lattice, pack_frame, pack_mesh};
+use rfm::{Experiment, Solid};
+
+/// Most particles of a scene that begins to run by itself.
+const MOST_AT_ONCE: usize = 200_000;
+
+/// What goes on in time.
+pub(super) enum Course {
+    Fluid(Box<Flow>),
+    Solid(Motion),
+}
+
+/// A simulation with what is drawn of its scene.
+pub(super) struct Flow {
+    pub simulation: Simulation,
+    pub experiment: Experiment,
+    pub history: History,
+    pub lattice: Lattice,
+    bodies: Bodies,
+}
+
+/// A solid that moves, with the time at which it is shown.
+pub(super) struct Motion {
+    bodies: Bodies,
+    way: Way,
+    time: f64,
+}
+
+impl Course {
+    /// Begins again.
+    ///
+    /// # Errors
+    /// Why that is not possible; everything is as it was then.
+    pub fn restart(&mut self) -> Result<(), String> {
+        match self {
+            Self::Fluid(flow) => flow.restart(),
+            Self::Solid(motion) => {
+                motion.time = 0.0;
+                Ok(())
+            }
+        }
+    }
+
+    /// The box in which it is shown.
+    pub fn room(&self) -> Aabb {
+        match self {
+            Self::Fluid(flow) => flow.experiment.domain(),
+            Self::Solid(motion) => motion.way.room,
+        }
+    }
+
+    /// The simulated time, s.
+    pub fn time(&self) -> f64 {
+        match self {
+            Self::Fluid(flow) => flow.simulation.time(),
+            Self::Solid(motion) => motion.time,
+        }
+    }
+
+    /// Whether it goes on as soon as it is there.
+    pub fn begins_by_itself(&self) -> bool {
+        match self {
+            Self::Fluid(flow) => (1..=MOST_AT_ONCE).contains(&flow.simulation.particles().len()),
+            Self::Solid(_) => true,
+        }
+    }
+
+    /// Whether there is nothing more to show.
+    pub fn has_ended(&self) -> bool {
+        match self {
+            Self::Fluid(_) => false,
+            Self::Solid(motion) => motion.time >= motion.way.end,
+        }
+    }
+
+    /// Goes on: a fluid by a step of its own, a solid by so much time, s.
+    ///
+    /// # Errors
+    /// Why the run has ended.
+    pub fn step(&mut self, by: f64) -> Result<(), String> {
+        match self {
+            Self::Fluid(flow) => flow
+                .simulation
+                .step()
+                .map_err(|error| format!("the run has ended at {:.4} s: {error}", flow.simulation.time())),
+            Self::Solid(motion) => {
+                motion.time = (motion.time + by).min(motion.way.end);
+                Ok(())
+            }
+        }
+    }
+
+    /// Whether a mesh belongs to one instant alone.
+    pub fn moves(&self) -> bool {
+        match self {
+            Self::Fluid(flow) => flow.bodies.move_about(),
+            Self::Solid(_) => true,
+        }
+    }
+
+    /// The block of the mesh of all solids as they stand now.
+    pub fn mesh(&self, run: u64) -> Result<Vec<u8>, String> {
+        let bodies = match self {
+            Self::Fluid(flow) => &flow.bodies,
+            Self::Solid(motion) => &motion.bodies,
+        };
+        mesh_at(bodies, self.time(), run)
+    }
+
+    /// The block of the present instant.
+    pub fn frame(&self, run: u64) -> Vec<u8> {
+        match self {
+            Self::Fluid(flow) => flow.frame(run),
+            Self::Solid(motion) => motion.frame(run),
+        }
+    }
+
+    /// What is to be said of it besides the time. `spent` is the time of the clock that a step takes, s.
+    pub fn details(&self, spent: f64) -> String {
+        match self {
+            Self::Fluid(flow) => flow.details(spent),
+            Self::Solid(_) => String::new(),
+        }
+    }
+
+    /// Adds the present instant to the quantities over time.
+    pub fn sample(&mut self) {
+        match self {
+            Self::Fluid(flow) => flow.history.sample(&flow.simulation),
+            Self::Solid(_) => {}
+        }
+    }
+
+    /// Lets gravity act in this direction from now on, m/s².
+    pub fn set_gravity(&mut self, gravity: DVec3) {
+        match self {
+            Self::Fluid(flow) => flow.simulation.set_turning_gravity(Arc::new(move |_| gravity)),
+            Self::Solid(_) => {}
+        }
+    }
+
+    /// The simulation, if a fluid flows.
+    pub fn flow(&self) -> Option<&Flow> {
+        match self {
+            Self::Fluid(flow) => Some(flow),
+            Self::Solid(_) => None,
+        }
+    }
+}
+
+impl Flow {
+    /// A simulation at its start, with obstacles of so many mesh cells along the longest side of each.
+    ///
+    /// # Errors
+    /// The messages, as the command line shows them.
+    pub fn start(experiment: Experiment, cells: usize) -> Result<Self, String> {
+        let mut simulation = experiment.start().map_err(refused)?.simulation;
+        let history = History::start(&mut simulation, experiment.scene());
+        let solids = experiment.bodies().iter().map(|body| body.solid.clone()).collect();
+        let domain = experiment.domain();
+        let (bodies, lattice) = (Bodies::of(solids, domain, cells), Lattice::new(&domain));
+        Ok(Self { simulation, experiment, history, lattice, bodies })
+    }
+
+    fn restart(&mut self) -> Result<(), String> {
+        self.simulation = self.experiment.start().map_err(refused)?.simulation;
+        self.history = History::start(&mut self.simulation, self.experiment.scene());
+        Ok(())
+    }
+
+    fn frame(&self, run: u64) -> Vec<u8> {
+        let particles = self.simulation.particles();
+        // by their ids, so that the page can follow each of them
+        let order = particles.order_by_id();
+        let column = |of: &dyn Fn(usize) -> f64| order.iter().map(|&i| of(i)).collect::<Vec<f64>>();
+        let velocity = &particles.velocity;
+        let arrays = [
+            column(&|i| velocity.get(i).length()),
+            column(&|i| particles.density[i]),
+            column(&|i| particles.pressure[i]),
+            column(&|i| velocity.x[i]),
+            column(&|i| velocity.y[i]),
+            column(&|i| velocity.z[i]),
+        ];
+        let places = order.iter().map(|&i| particles.position.get(i));
+        let (frame, ranges) = Frame::of(&self.lattice, places, &arrays.each_ref().map(Vec::as_slice));
+        let (time, step) = (self.simulation.time(), Some(self.simulation.steps()));
+        pack_frame(&FrameHead { time, step, ranges, mesh: None, run, motion: None }, &frame, None)
+    }
+
+    fn details(&self, spent: f64) -> String {
+        let speed = if spent > 0.0 { format!(" · {:.1} ms per step", 1e3 * spent) } else { String::new() };
+        let found = self.simulation.findings();
+        let found = found.last().map_or_else(String::new, |(_, message)| format!(" · {message}"));
+        format!(" · step {}{speed}{found}", self.simulation.steps())
+    }
+}
+
+/// The block of the mesh of all solids at a time, s.
+pub(super) fn mesh_at(bodies: &Bodies, time: f64, run: u64) -> Result<Vec<u8>, String> {
+    let meshes = bodies.meshes_at(time).map_err(message)?;
+    Ok(pack_mesh(&split_creases(&Mesh::joined(&meshes)), time, run))
+}
+
+impl Motion {
+    /// A solid that moves within a room.
+    pub fn of(solid: Solid, way: Way, time: f64, cells: usize) -> Self {
+        Self { bodies: Bodies::of(vec![solid], way.room, cells), way, time: time.min(way.end) }
+    }
+
+    fn frame(&self, run: u64) -> Vec<u8> {
+        let head =
+            FrameHead { time: self.time, step: None, ranges: Vec::new(), mesh: None, run, motion: None };
+        pack_frame(&head, &Frame::default(), None)
+    }
+}
