@@ -427,7 +427,7 @@ pub(super) struct Run {
     /// Do not draw an obstacle; may be repeated
     #[arg(long, help_heading = "Pictures", value_name = "NAME", value_delimiter = ',')]
     pub hide: Vec<String>,
-    /// Draw an obstacle as clear glass, so that the fluid behind it is seen; may be repeated
+    /// Draw an obstacle as clear glass, so that the fluid behind it is seen; a plane of --cut opens it; may be repeated
     #[arg(long, help_heading = "Pictures", value_name = "NAME", value_delimiter = ',')]
     pub glass: Vec<String>,
     /// Draw the surface of the fluid in place of its particles: `clear` shows what is in the fluid, `opaque` does not

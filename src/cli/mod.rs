@@ -39,7 +39,6 @@ mod survey;
 mod sweep;
 mod values;
 mod view;
-mod way;
 
 use std::ffi::OsString;
 use std::process::ExitCode;

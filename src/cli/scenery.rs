@@ -150,7 +150,7 @@ pub(super) fn described(names: &[&str], drawn: &[Drawn]) -> Vec<String> {
     let mut done: Vec<(String, Vec<&str>)> = Vec::new();
     for (name, drawn) in names.iter().zip(drawn) {
         let what = match drawn {
-            // clear obstacles are seen to be clear
+            // that an obstacle is clear is seen
             Drawn::Whole | Drawn::Glass(None) => continue,
             Drawn::Hidden => "left out".to_string(),
             Drawn::Open(cut) | Drawn::Glass(Some(cut)) => {

@@ -14,6 +14,7 @@
 
 mod bodies;
 mod deviation;
+mod dry;
 mod every;
 mod filling;
 mod fingerprint;
@@ -166,6 +167,7 @@ impl Experiment {
         let obstacles = self.obstacles();
         let mut filling = self.fill(&obstacles)?;
         let carving = self.carving(&filling);
+        let dry = self.dry_walls(&filling.particles);
         let mut particles = std::mem::take(&mut filling.particles);
         self.set_in_motion(&mut particles);
         let filling::Filling { carved, mass, fills_vessel, .. } = filling;
@@ -179,7 +181,8 @@ impl Experiment {
         self.set_gravity(&mut simulation);
         let outside = self.reach().ok().and_then(|bounds| self.outside(&bounds));
         let lightening = self.lightening(&filling, simulation.parameters().particle_mass);
-        let warnings = self.diagnostics(outside.into_iter().chain(carving).chain(lightening).collect());
+        let warnings =
+            self.diagnostics(outside.into_iter().chain(carving).chain(lightening).chain(dry).collect());
         let carved = carved.inside + carved.too_close + carved.outside_box;
         Ok(Start { simulation, carved, warnings })
     }

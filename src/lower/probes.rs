@@ -194,7 +194,8 @@ impl<'a> Lowering<'a> {
         let [x, y] = [x, y].map(|part| self.quantity_expr(part, Dimension::LENGTH, "height"));
         let (x, y) = (x?, y?);
         let inside = domain.contains(DVec3::new(x, y, domain.min.z));
-        self.within(inside, value, format!("[{x}, {y}]"), domain).then_some([x, y])
+        let found = format!("[x, y] = [{x}, {y}], as heights are measured along z");
+        self.within(inside, value, found, domain).then_some([x, y])
     }
 
     fn no_pair(&mut self, value: &Expr) -> Option<[f64; 2]> {

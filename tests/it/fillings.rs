@@ -251,3 +251,38 @@ scene full {
     }
     assert!(straight.checkpoint() == resumed.checkpoint());
 }
+
+/// What is told of walls that no particle reaches: of a cylinder on a floor, less with a smaller spacing; nothing where the
+/// floor is 45 degrees away, where the shape is only the room for a number of particles of a stated size, or where a lattice
+/// does not fit a plate.
+#[test]
+fn walls_without_particles_are_told_of() {
+    let said = |solid: &str, fluid: &str| {
+        let text = format!(
+            "rfm 1
+solid body = {solid}
+scene rest {{
+  box {{ max: [1, 0.02, 0.8] }}
+  obstacle {{ solid: body }}
+  fluid water {{ shape: box([0, 0, 0], [1, 0.02, 0.4]) \\ body, density: 1000, {fluid} }}
+  run {{ until: 1 s }}
+}}"
+        );
+        let program = Program::from_source("rest.rfm", text).unwrap_or_else(|e| panic!("{e}"));
+        let experiment = Experiment::new(&program, "rest", Engine::Auto).unwrap_or_else(|e| panic!("{e}"));
+        let start = experiment.start().unwrap_or_else(|e| panic!("{e}"));
+        let mut dry = start.warnings.list.into_iter().filter(|warning| warning.code.0 == "W0518");
+        dry.next().map(|warning| {
+            let (before, _) = warning.message.split_once(" % of the load").unwrap();
+            before.rsplit(' ').next().unwrap().parse::<f64>().unwrap()
+        })
+    };
+    let roll = "cylinder(0.4, 4).rotate_x(90 deg).move([1, 2, 0.4])";
+    // particles reach to √(2Rs) = 0.13 and 0.06 m before the line where walls touch, and two spacings farther none is near: 0.09
+    // and 0.05 m of the 0.63 m along the cylinder, where the load is greatest
+    let (coarse, fine) = (said(roll, "spacing: 0.02").unwrap(), said(roll, "spacing: 0.005").unwrap());
+    assert!((8.0..20.0).contains(&coarse) && (5.0..14.0).contains(&fine) && fine < coarse, "{coarse} {fine}");
+    assert_eq!(said("half_space([-1, 0, 1], [0.5, 0, 0])", "spacing: 0.02"), None);
+    assert_eq!(said("box([0.613, -1, -1], [0.8, 1, 1])", "spacing: 0.02"), None);
+    assert_eq!(said(roll, "spacing: 0.02, particles: 500, fill: middle"), None);
+}

@@ -266,7 +266,7 @@ fn refusals_say_why() {
     let here = folder.path();
     run(here);
     std::fs::write(here.join("swing.rfm"), SWING).unwrap();
-    let cases: [(&[&str], &str); 22] = [
+    let cases: [(&[&str], &str); 23] = [
         (&["drop.out", "-o", "a.jpg"], ".jpg is none of .png .gif .apng .mp4 .webm"),
         (&["drop.out", "-o", "a.png"], "`a.png` is one picture, and there are 6 frames"),
         (&["drop.out", "-o", "a.gif", "--fps", "60"], "50 is the most"),
@@ -283,8 +283,9 @@ fn refusals_say_why() {
         (&["drop.rfm", "--by", "speed"], "--by is for the folder of a run"),
         (&["drop.rfm", "-o", "a.gif"], "`post` does not move"),
         (&["drop.rfm", "--times", "0..1"], "--times is for films"),
-        (&["swing.rfm", "-o", "a.gif", "--times", "0.."], "state the end"),
-        (&["swing.rfm", "-o", "a.gif", "--times", "0..1e9"], "100000 is the most"),
+        (&["swing.rfm", "-o", "a.gif", "--times", "0.."], "begins and ends"),
+        (&["swing.rfm", "-o", "a.gif", "--times", "..-1"], "begins and ends"),
+        (&["swing.rfm", "-o", "a.gif", "--times", "0..1e9"], "100000 is the most; --fps"),
         (&["swing.rfm", "-o", "a.gif", "--time", "1"], "--times A..B are those of a film"),
         (&["drop.rfm", "--cut", "auto"], "choose a plane"),
         (&["nothing.rfm"], "cannot read `nothing.rfm`"),
@@ -417,4 +418,25 @@ fn a_solid_that_moves_becomes_a_film() {
     }
     let bytes = |name: &str| std::fs::read(here.join(name)).unwrap();
     assert!(bytes("1.gif") == bytes("2.gif") && bytes("1.gif").len() > 1000);
+}
+
+/// Glass that is cut open lets what lies before it be seen: the picture is another one, and the title tells where it was cut.
+#[test]
+fn glass_is_cut_open_like_stone() {
+    let folder = tempfile::tempdir().unwrap();
+    let here = folder.path();
+    run(here);
+    let render = |target: &str, others: &[&str]| {
+        let flags =
+            ["render", "drop.out", "-o", target, "--frames", "0", "--size", "640x480", "--title", "drop"];
+        rfm(here, &[&flags[..], others].concat()).expect(0);
+        std::fs::read(here.join(target)).unwrap()
+    };
+    let whole = render("whole.png", &["--glass", "post,moon", "--cut", "none"]);
+    let open = render("open.png", &["--glass", "post,moon", "--cut", "y=0.3"]);
+    let hidden = render("hidden.png", &["--hide", "post,moon"]);
+    assert!(whole != open && open != hidden);
+    // what stands before the plane is gone altogether: the moon, which reaches to y = 0.35 only
+    let before = render("before.png", &["--glass", "moon", "--hide", "post", "--cut", "y=0.4"]);
+    assert!(before == hidden);
 }

@@ -77,7 +77,7 @@ pub(in crate::cli) struct Render {
     /// Do not draw an obstacle; may be repeated
     #[arg(long, help_heading = "Runs", value_name = "NAME", value_delimiter = ',')]
     pub hide: Vec<String>,
-    /// Draw an obstacle as clear glass, so that the fluid behind it is seen; may be repeated
+    /// Draw an obstacle as clear glass, so that the fluid behind it is seen; a plane of --cut opens it; may be repeated
     #[arg(long, help_heading = "Runs", value_name = "NAME", value_delimiter = ',')]
     pub glass: Vec<String>,
     /// Draw the surface of the fluid, which `rfm mesh DIR --fluid` makes, in place of the particles: `clear` shows what is in
@@ -100,8 +100,8 @@ pub(in crate::cli) struct Render {
     /// Only these frames, counted from 0; B is the first that is left out [default: all]
     #[arg(long, help_heading = "Runs", value_name = "A..B", value_parser = frames)]
     pub frames: Option<Frames>,
-    /// Only frames of these times, in seconds or with units: 0.5..2, 500ms..; the times of a film of a solid
-    /// [default: all, 0..2 of a solid]
+    /// Only frames of these times, in seconds or with units: 0.5..2, 500ms..; of a solid that moves, the times of the film
+    /// [default: all frames; 0..2 for a solid]
     #[arg(long, value_name = "A..B", value_parser = times, conflicts_with = "frames", allow_hyphen_values = true)]
     pub times: Option<(f64, f64)>,
     /// Only every n-th of them

@@ -8,7 +8,7 @@ use super::film::{Kind, Target};
 use super::options::Render;
 use crate::cli::args::Shared;
 use crate::cli::failure::Failure;
-use crate::cli::output::Shown;
+use crate::cli::output::{Shown, counted};
 use crate::cli::run::bodies::Bodies;
 use crate::cli::scenery::{self, Drawn, half_towards_eye};
 use crate::cli::values::CutFlag;
@@ -18,6 +18,7 @@ use rfm::field::Points;
 use rfm::geom::Aabb;
 use rfm::mesh::Mesh;
 use rfm::render::{Backdrop, Camera, Caption, Image, Legend, Moving, ParticlesView};
+use rfm::solid::Bounds;
 
 /// Cells of the mesh along the longest side, unless others are asked for.
 const CELLS: usize = 128;
@@ -91,6 +92,7 @@ fn film(shared: &Shared, options: &Render, solid: &Solid, target: &Target) -> Re
         return refuse("--time is for one picture; --times A..B are those of a film".into());
     }
     let times = instants(options.times, target.rate)?;
+    target.check(times.len())?;
     let moments: Vec<Solid> = times.iter().map(|time| solid.at(*time)).collect();
     let domain = room(&moments)?;
     let (camera, drawn) = seen(options, &domain)?;
@@ -104,17 +106,17 @@ fn film(shared: &Shared, options: &Render, solid: &Solid, target: &Target) -> Re
         let moving = Moving { meshes: &scenery::views(&bodies), particles, balls: false };
         Ok(still.frame_with(&moving, &Caption { time: times[k], step: None }))
     };
-    target.check(times.len())?;
     target.write(&(0..times.len()).collect::<Vec<_>>(), &picture)?;
     let (width, height) = options.size;
     if shared.json {
         return output::json(&serde_json::json!({
-            "schema": 1, "output": target.path.display().to_string(), "solid": name, "pictures": times.len(),
+            "schema": 1, "file": target.path.display().to_string(), "solid": name, "pictures": times.len(),
             "width": width, "height": height,
         }));
     }
     let (first, last) = (times[0], times[times.len() - 1]);
-    say!("{name}: {} pictures of {width} × {height}, from {first} s to {last} s", times.len());
+    let pictures = counted(times.len(), "picture");
+    say!("{name}: {pictures} of {width} × {height}, from {first} s to {last} s");
     say!("written to {}", target.path.shown());
     Ok(())
 }
@@ -122,33 +124,41 @@ fn film(shared: &Shared, options: &Render, solid: &Solid, target: &Target) -> Re
 /// The instants of a film, s.
 fn instants(times: Option<(f64, f64)>, rate: u32) -> Result<Vec<f64>, Failure> {
     let (from, to) = times.unwrap_or((0.0, END));
-    if !to.is_finite() {
-        return Err(Failure::usage("--times: a solid moves for ever; state the end, as in 0..2"));
+    let from = if from == f64::NEG_INFINITY { 0.0 } else { from };
+    if !to.is_finite() || from > to {
+        return Err(Failure::usage("--times: state when a film of a solid begins and ends, as in 0..2"));
     }
-    let from = if from.is_finite() { from } else { 0.0_f64.min(to) };
     // sums of steps are not exact
     let count = ((to - from) * f64::from(rate) * (1.0 + 1e-12)).floor() + 1.0;
     if count > MOST_PICTURES {
         return Err(Failure::usage(format!(
-            "--times: {count:.0} pictures, and {MOST_PICTURES:.0} is the most"
+            "--times: that is {count:.1e} pictures, and {MOST_PICTURES:.0} is the most; --fps makes them fewer"
         )));
     }
     Ok((0..count as u64).map(|k| from + k as f64 / f64::from(rate)).collect())
 }
 
 /// A box around a solid at all these times.
+///
+/// # Errors
+/// It has none at one of them, or is empty at all of them.
 fn room(moments: &[Solid]) -> Result<Aabb, Failure> {
-    let bounds: Vec<Option<Aabb>> = moments.par_iter().map(|solid| solid.bounds().aabb()).collect();
-    // a solid may be empty for a while
-    let room = bounds
-        .into_iter()
-        .flatten()
-        .reduce(|all, next| Aabb::new(all.min.min(next.min), all.max.max(next.max)));
-    let room = room.ok_or_else(|| {
-        let name = moments[0].name();
-        Failure::usage(format!("`{name}` is empty, or could not be proven to end: there is nothing to show"))
-    })?;
-    Ok(room.grown(1e-3 * room.size().max_element()))
+    let name = moments[0].name();
+    let refuse = |why: String| Err(Failure::usage(format!("`{name}` {why}: there is nothing to show")));
+    let bounds: Vec<Bounds> = moments.par_iter().map(|solid| *solid.bounds()).collect();
+    let mut room = None::<Aabb>;
+    for (bounds, solid) in bounds.into_iter().zip(moments) {
+        match bounds {
+            Bounds::Within(bounds) => room = Some(room.map_or(bounds, |room| room.union(&bounds))),
+            // of a film it may be empty for a while
+            Bounds::Empty => {}
+            Bounds::Unbounded => return refuse(format!("could not be proven to end at {} s", solid.time())),
+        }
+    }
+    match room {
+        Some(room) => Ok(room.grown(1e-3 * room.size().max_element())),
+        None => refuse("is empty".into()),
+    }
 }
 
 fn mesh(solid: Solid, domain: Aabb, options: &Render) -> Result<Mesh, Failure> {

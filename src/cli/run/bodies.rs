@@ -27,10 +27,6 @@ impl Bodies {
         Self { solids, domain, cells }
     }
 
-    pub fn solids(&self) -> &[Solid] {
-        &self.solids
-    }
-
     pub fn is_empty(&self) -> bool {
         self.solids.is_empty()
     }

@@ -5,9 +5,9 @@ use std::sync::Arc;
 use glam::DVec3;
 
 use super::super::run::bodies::Bodies;
-use super::super::way::Way;
 use super::messages::{message, refused};
 use super::plots::History;
+use super::way::Way;
 use rfm::geom::Aabb;
 use rfm::mesh::{Mesh, split_creases};
 use rfm::sph::Simulation;
@@ -48,7 +48,7 @@ impl Course {
         match self {
             Self::Fluid(flow) => flow.restart(),
             Self::Solid(motion) => {
-                motion.time = 0.0;
+                motion.time = motion.way.start;
                 Ok(())
             }
         }
@@ -132,6 +132,7 @@ impl Course {
     pub fn details(&self, spent: f64) -> String {
         match self {
             Self::Fluid(flow) => flow.details(spent),
+            Self::Solid(_) if self.has_ended() => " at the end of its way".into(),
             Self::Solid(_) => String::new(),
         }
     }
@@ -217,8 +218,8 @@ pub(super) fn mesh_at(bodies: &Bodies, time: f64, run: u64) -> Result<Vec<u8>, S
 
 impl Motion {
     /// A solid that moves within a room.
-    pub fn of(solid: Solid, way: Way, time: f64, cells: usize) -> Self {
-        Self { bodies: Bodies::of(vec![solid], way.room, cells), way, time: time.min(way.end) }
+    pub fn of(solids: Vec<Solid>, way: Way, time: f64, cells: usize) -> Self {
+        Self { bodies: Bodies::of(solids, way.room, cells), way, time }
     }
 
     fn frame(&self, run: u64) -> Vec<u8> {

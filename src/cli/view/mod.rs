@@ -7,6 +7,7 @@
 //! | `folder` | the folder of a run → a page with its frames |
 //! | `plots` | energy, audit and probes over time, of a folder or of a simulation that goes on |
 //! | `section` | ω in a plane |
+//! | `way` | where a solid is while it is watched |
 //! | `server`, `request`, `stream` | the page and its stream at an address with a token |
 //! | `board` | the newest of everything that pages are told |
 //! | `session`, `model`, `course`, `command` | what goes on in time on its own thread, and what pages ask of it |
@@ -27,6 +28,7 @@ mod section;
 mod server;
 mod session;
 mod stream;
+mod way;
 
 use std::path::Path;
 use std::sync::Arc;

@@ -8,10 +8,10 @@ use super::super::args::Shared;
 use super::super::choose;
 use super::super::input;
 use super::super::run::bodies::Bodies;
-use super::super::way::Way;
 use super::course::{Course, Flow, Motion, mesh_at};
 use super::messages::{message, plain, refused};
 use super::options::View;
+use super::way::Way;
 use crate::cli::output::Shown;
 use rfm::compile::files_beside;
 use rfm::files::Files;
@@ -43,11 +43,14 @@ pub(super) struct Checked {
     solid: Option<String>,
 }
 
-/// Solids with the block of their mesh and the box in which they are shown.
+/// Solids with the box in which they are shown.
 pub(super) struct Standing {
-    pub mesh: Vec<u8>,
     pub solids: Vec<Solid>,
     pub domain: Aabb,
+    /// The way of a solid alone.
+    pub way: Option<Way>,
+    /// When they stand so, s.
+    pub time: f64,
 }
 
 /// How fine a mesh is.
@@ -130,7 +133,8 @@ impl Subject {
         Ok(Checked { program, scene, solid: self.solid.clone() })
     }
 
-    /// All that stands in the fluid's way at a time, s, or the solid.
+    /// All that stands in the fluid's way at the start, or the solid at a time, s, with the block of its mesh. A solid whose way
+    /// ends before that time is shown at its end.
     ///
     /// # Errors
     /// Why there is no mesh.
@@ -140,22 +144,25 @@ impl Subject {
         detail: Detail,
         time: f64,
         run: u64,
-    ) -> Result<Standing, String> {
-        let (solids, domain) = match &checked.scene {
-            Some(scene) => (self.solids_of(checked, scene)?, scene.domain),
+    ) -> Result<(Vec<u8>, Standing), String> {
+        let standing = match &checked.scene {
+            Some(scene) => {
+                let solids = self.solids_of(checked, scene)?;
+                Standing { solids, domain: scene.domain, way: None, time: 0.0 }
+            }
             None => {
                 let solid = self.solid_of(checked)?;
-                let room = Way::of(&solid)?.room;
-                (vec![solid], room)
+                let way = Way::of(&solid)?;
+                let time = time.clamp(way.start, way.end);
+                Standing { solids: vec![solid], domain: way.room, way: Some(way), time }
             }
         };
         let cells = match detail {
             Detail::Passing => self.cells.min(PASSING_CELLS),
             Detail::Lasting => self.cells,
         };
-        let bodies = Bodies::of(solids, domain, cells);
-        let mesh = mesh_at(&bodies, time, run)?;
-        Ok(Standing { mesh, solids: bodies.solids().to_vec(), domain })
+        let bodies = Bodies::of(standing.solids.clone(), standing.domain, cells);
+        Ok((mesh_at(&bodies, standing.time, run)?, standing))
     }
 
     /// The box in which a scene or a solid is shown.
@@ -195,14 +202,10 @@ impl Subject {
         Ok(Course::Fluid(Box::new(Flow::start(experiment, self.cells)?)))
     }
 
-    /// The way of the solid from a time on, s; `None` if it stands still.
-    ///
-    /// # Errors
-    /// Why there is nothing to show.
-    pub fn motion(&self, checked: &Checked, time: f64) -> Result<Option<Course>, String> {
-        let solid = self.solid_of(checked)?;
-        let way = Way::of(&solid)?;
-        Ok((way.end > 0.0).then(|| Course::Solid(Motion::of(solid, way, time, self.cells))))
+    /// What goes on where a solid stands alone; `None` if it does not move.
+    pub fn motion(&self, standing: &Standing) -> Option<Course> {
+        let way = standing.way.filter(|way| way.end > way.start)?;
+        Some(Course::Solid(Motion::of(standing.solids.clone(), way, standing.time, self.cells)))
     }
 
     /// What a page shows besides frames and meshes.

@@ -47,7 +47,7 @@ pub(super) struct Session {
     course: Option<Course>,
     status: Status,
     /// What stands in the scene as it is shown, and the box around it.
-    standing: Option<(Vec<Solid>, Aabb)>,
+    standing: Option<Standing>,
     /// The plane in which a page looks at ω.
     plane: Option<Plane>,
     /// Gravity in the box, m/s², if a page has turned it.
@@ -232,23 +232,28 @@ impl Session {
 
     /// Checks the file with values for params and shows its obstacles. `None` if that is not possible; the reason is
     /// told then.
-    fn show_mesh(&mut self, values: &BTreeMap<String, f64>, detail: Detail) -> Option<(Checked, Aabb)> {
+    fn show_mesh(&mut self, values: &BTreeMap<String, f64>, detail: Detail) -> Option<Checked> {
         let began = Instant::now();
+        // a solid that moves goes on from where it is
+        let time = match &self.course {
+            Some(course @ Course::Solid(_)) => course.time(),
+            Some(Course::Fluid(_)) | None => 0.0,
+        };
         let made = self.subject.checked(values).and_then(|checked| {
-            let time = if checked.scene.is_some() { 0.0 } else { self.time() };
             let made = self.subject.standing(&checked, detail, time, self.run)?;
-            Ok((checked, made, time))
+            Ok((checked, made))
         });
         match made {
-            Ok((checked, Standing { mesh, solids, domain }, time)) => {
+            Ok((checked, (mesh, standing))) => {
                 self.board.set_block(Topic::Mesh, mesh);
                 self.pace.mesh.time = f64::NAN;
                 self.status.error = None;
-                self.standing = Some((solids, domain));
+                let time = standing.time;
+                self.standing = Some(standing);
                 self.show_slice(time);
                 self.status.latency =
                     Some(format!("the obstacle followed in {:.0} ms", began.elapsed().as_secs_f64() * 1e3));
-                Some((checked, domain))
+                Some(checked)
             }
             Err(error) => {
                 self.status.error = Some(error);
@@ -264,16 +269,17 @@ impl Session {
         self.status.error = None;
         self.tell();
         let values = self.values.clone();
-        let Some((checked, bounds)) = self.show_mesh(&values, Detail::Lasting) else {
+        let (Some(checked), Some(standing)) = (self.show_mesh(&values, Detail::Lasting), &self.standing)
+        else {
             // a file that was never right has no picture that could remain
             self.status.playing &= self.course.is_some();
             return;
         };
-        let standing = self.standing.as_ref().map_or(&[][..], |(solids, _)| solids);
-        self.board.set_field(&Field::of(&checked, standing));
+        let bounds = standing.domain;
+        self.board.set_field(&Field::of(&checked, &standing.solids));
         let course = match &checked.scene {
             Some(scene) => self.subject.start(&checked, scene).map(Some),
-            None => self.subject.motion(&checked, self.time()),
+            None => Ok(self.subject.motion(standing)),
         };
         match course {
             Ok(course) => {
@@ -311,7 +317,7 @@ impl Session {
     fn begin(&mut self, bounds: &Aabb) {
         self.run += 1;
         if self.course.as_ref().and_then(Course::flow).is_none() {
-            // of a fluid that the file no longer has
+            // a fluid that the file no longer has must not be seen by a page that is opened now
             self.board.clear(Topic::Frame);
             self.board.clear(Topic::Plots);
             self.status.text.clear();
@@ -338,9 +344,9 @@ impl Session {
 
     /// Shows ω at a time, s, in the plane that is asked for.
     fn show_slice(&mut self, time: f64) {
-        let (Some(plane), Some((solids, domain))) = (self.plane, &self.standing) else { return };
-        let solids: Vec<Solid> = solids.iter().map(|solid| solid.at(time)).collect();
-        match section::block(&solids, domain, plane, self.run) {
+        let (Some(plane), Some(standing)) = (self.plane, &self.standing) else { return };
+        let solids: Vec<Solid> = standing.solids.iter().map(|solid| solid.at(time)).collect();
+        match section::block(&solids, &standing.domain, plane, self.run) {
             Ok(Some(block)) => self.board.set_block(Topic::Slice, block),
             // a scene without obstacles has no ω
             Ok(None) => {}
@@ -382,7 +388,7 @@ impl Session {
     /// Takes steps, at least one, until `is_enough` of the simulated time, and shows the instant. `by` is the time, s,
     /// by which something goes on that has no steps of its own.
     fn steps(&mut self, by: f64, is_enough: impl Fn(f64) -> bool) {
-        let Some(course) = &mut self.course else { return };
+        let Some(course) = self.course.as_mut().filter(|course| !course.has_ended()) else { return };
         loop {
             let began = Instant::now();
             if let Err(error) = course.step(by) {

@@ -13,7 +13,7 @@ use crate::sph::params::Parameters;
 pub(super) struct Crowding {
     pub kernel: Wendland,
     /// V·c, 1/m².
-    steepness: f64,
+    pub steepness: f64,
 }
 
 impl Crowding {
@@ -21,11 +21,6 @@ impl Crowding {
         let kernel = Wendland::new(parameters.support_radius);
         let volume = parameters.particle_mass / parameters.rest_density;
         Self { kernel, steepness: volume * kernel.steepness }
-    }
-
-    /// The factor V·c, 1/m².
-    pub fn steepness(&self) -> f64 {
-        self.steepness
     }
 
     /// Adds the neighbours at **d**.

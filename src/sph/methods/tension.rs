@@ -143,12 +143,12 @@ impl PairPass<4, 2, 3> for Curvature<'_> {
 
     fn finish(&self, i: usize, [turn, moment]: [f64; 2]) -> [f64; 3] {
         let normal = self.normal.get(i);
-        let moment = 0.5 * self.crowding.steepness() * moment;
+        let moment = 0.5 * self.crowding.steepness * moment;
         if moment < LEAST_MOMENT {
             return [0.0; 3];
         }
         // with d from the neighbour, ∇·n̂ = −Σ V (n̂_j − n̂_i)·cf·d over the moment
-        let curvature = self.crowding.steepness() * turn / moment;
+        let curvature = self.crowding.steepness * turn / moment;
         let Parameters { surface_tension, rest_density, .. } = *self.parameters;
         (2.0 * surface_tension / rest_density * self.weight[i] * curvature * normal).to_array()
     }

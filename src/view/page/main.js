@@ -46,8 +46,11 @@ class Viewer {
     const goesOn = setting.arrays.length > 0 || setting.moves;
     byId("transport").hidden = !goesOn;
     byId("record").hidden = !window.MediaRecorder || !goesOn;
-    // a file that has lost its fluid, or the motion of its solid
-    if (!goesOn && this.timeline.frames.length) {
+    // a file that has lost its fluid, or the motion of its solid, or has become another: its frames have other arrays
+    const arrays = setting.arrays.map((array) => array.name).join();
+    const isOther = this.arrays !== undefined && arrays !== this.arrays;
+    this.arrays = arrays;
+    if ((isOther || !goesOn) && this.timeline.frames.length) {
       this.timeline.clear();
       this.timelineChanged();
       this.tellPlots([]);

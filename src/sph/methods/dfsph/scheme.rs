@@ -44,11 +44,10 @@
 //!
 //! The pressure of a particle is G·ρ²s, because the sums make G·∇p of a pressure that is linear in
 //! space (G = 0.98 in the depth of a fluid that has left the lattice). It is averaged over τ, because the
-//! divergence of velocity that one step leaves is a pressure in the next. The reported one is averaged over less where
-//! particles move fast: water that runs up a wall carried the pressure of the impact along, and the mean over the wall was twice the
-//! force on it. It is that of the field around the
+//! divergence of velocity that one step leaves is a pressure in the next. The reported one is that of the field around the
 //! particle ([`Field`]): what keeps the density of one particle differs from its neighbours' by a fifth of a layer's weight, in
-//! still water too, where these differences balance each other.
+//! still water too, where these differences balance each other. It is averaged over less where particles move fast: water that
+//! runs up a wall would carry the pressure of its impact along, and the mean over the wall would be twice the force on it.
 //!
 //! Invariant: the densities are those of the present positions.
 
@@ -103,9 +102,9 @@ pub(super) const OWED: f64 = 0.6;
 /// does not see. (Eight layers lie still with 0.75 and burst with 1, as a column of eighty does.)
 const STABLE: f64 = 0.75;
 
-/// The part of ‖M‖² by which ω² is larger beside walls, where M completes an acceleration and changes with the place as M∇K·M
-/// does: ‖M‖ is 2 at a plane, 2.8 in the corner of a box and 4 in a gap one spacing wide. Without it water that tapers off
-/// between a cylinder and a floor reaches 60 m/s, and columns of fifty to seventy layers, four wide, burst.
+/// ω² beside walls over that in the depth, for each unit of ‖M‖²: M completes an acceleration there, and changes with the
+/// place as M∇K·M does. ‖M‖ is 2 at a plane, 2.8 in the corner of a box and 4 in a gap one spacing wide. Without it water that
+/// tapers off between a cylinder and a floor reaches 60 m/s, and columns of sixty and seventy layers, four wide, burst.
 const STIFFER_AT_WALLS: f64 = 0.375;
 
 /// The scheme. It keeps the pressures, and what is owed, between steps; the rest is working memory.
@@ -117,7 +116,7 @@ pub struct DivergenceFree {
     places: Solver,
     /// The density, kg/m³, that each particle would have gained by what the solver of forces left.
     pub(super) debt: Vec<f64>,
-    /// The pressure that each particle bears, Pa, averaged as the reported one is.
+    /// The pressure that each particle bears, Pa, averaged over the relaxation time.
     pub(super) own_pressure: Vec<f64>,
     /// How stiff a lattice of these particles is, see [`Wendland::lattice_stiffness`].
     stiffness: f64,
@@ -440,7 +439,7 @@ impl DivergenceFree {
     }
 }
 
-/// The square of the largest eigenvalue of a positive symmetric matrix, too large by a seventh at most: ‖M⁸‖^¼ in
+/// The square of the largest eigenvalue of a positive symmetric matrix, too large by 15 % at most: ‖M⁸‖^¼ in
 /// Frobenius' norm.
 fn square_of_norm(matrix: &DMat3) -> f64 {
     let square = *matrix * *matrix;
@@ -451,7 +450,7 @@ fn square_of_norm(matrix: &DMat3) -> f64 {
 }
 
 /// The time, s, in which a debt is paid back, after a step of the length `dt` with this greatest speed. Reported
-/// pressures are averaged over the same time.
+/// pressures are averaged over no more than that time.
 ///
 /// A step may be short for other reasons than the motion of the fluid: a frame is due, a body jumps, or what a body did made
 /// an acceleration large. A debt that were paid back within eight such steps would become a speed without bound (a still
@@ -500,5 +499,17 @@ mod tests {
         }
         // without weight it is that of the expected motion
         assert!(of(0.0, 0.0, 1e-7) < 0.5 * fall && of(0.0, 0.0, 1e-7) == of(0.0, 0.0, 1e-5));
+    }
+
+    #[test]
+    fn the_norm_of_a_completion_is_its_largest_eigenvalue() {
+        // 4, 2 and 1 along turned axes
+        let turn = DMat3::from_rotation_z(0.4) * DMat3::from_rotation_x(1.1);
+        let matrix = turn * DMat3::from_diagonal(DVec3::new(4.0, 2.0, 1.0)) * turn.transpose();
+        let found = square_of_norm(&matrix);
+        assert!((16.0..16.01).contains(&found), "{found}");
+        // where all are alike it is too large by the eighth root of three
+        let alike = square_of_norm(&(2.0 * DMat3::IDENTITY));
+        assert!((alike / (4.0 * 3_f64.powf(0.125)) - 1.0).abs() < 1e-12, "{alike}");
     }
 }
