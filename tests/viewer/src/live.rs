@@ -167,7 +167,9 @@ pub fn moving_solid(room: &mut Room) {
     std::fs::write(&file, pellet).unwrap();
     let viewer = Viewer::start(&room.folder, &["pellet.rfm"]);
     room.browser.open(&viewer.address);
-    let at_end = "!viewer.run.playing && document.getElementById('state').textContent === 'paused at the end of its way'";
+    // words and frames come apart; its way ends at the greatest 1024/2^k s in which it takes up no more than twelve diameters
+    let at_end = "!viewer.run.playing && document.getElementById('state').textContent === 'paused at the end of its way' \
+                  && viewer.timeline.frames.at(-1)?.time === 0.03125";
     room.browser.wait_for(&format!("window.viewer && {at_end}"));
     let count = room.browser.number("viewer.timeline.frames.length");
     room.browser.click("#forward");
