@@ -1,10 +1,12 @@
 //! The audit of a simulation: what its energy, its volume and its densities say about whether it can be
 //! believed. It runs in every simulation and changes nothing in it.
 //!
-//! Energy is compared with the work of gravity after every step: E = ½Σmv² + Σm·e(ρ) − W, where the work of
-//! uniform gravity is W = M·g·Δ(centre of mass), and that of a field of gravity is the integral of its power.
-//! Viscosity, contacts and diffusion only take from E, so all that it gains is an error of the method. The
-//! energy that a surface under tension has at the start may become motion, so it is allowed for.
+//! Energy is compared with the work of gravity and of walls after every step: E = ½Σmv² + Σm·e(ρ) − W. The work of
+//! uniform gravity is M·g·Δ(centre of mass), and that of a field of gravity is the integral of its power. That of walls which
+//! move is the sum of force times way over what they do to particles in pressure, friction and contacts. Viscosity,
+//! contacts with walls at rest and diffusion only take from E, so all that it gains is an error of the method. Where walls work
+//! on the fluid, what they give is soon dissipated, and would hide any gain: there E is compared with the least that it has been.
+//! The energy that a surface under tension has at the start may become motion, so it is allowed for.
 //!
 //! Densities are those that the particles' places say, Σ m·W and the part of the walls, and not those that a
 //! method carries along. A density below that at rest belongs to the surface and counts as that at rest.
@@ -20,6 +22,10 @@ use super::params::Parameters;
 
 /// The least energy at the start that is judged, in units of Σm·(expected speed)².
 const LEAST_ENERGY: f64 = 1e-9;
+
+/// The least energy with which what walls give is compared, in units of Σm·(expected speed)²: that of a thirtieth of this
+/// speed. A fluid that they set in motion begins with none.
+const LEAST_GIVEN: f64 = 5e-4;
 
 /// Number of steps from one look at the densities to the next.
 const LOOK: u64 = 8;
@@ -42,8 +48,8 @@ const CLASS: f64 = 5e-4;
 /// Number of classes; the last one also holds all that is compressed more.
 const CLASSES: usize = 2048;
 
-/// Why the energy is not judged where obstacles or their surfaces move.
-pub const MOVING_WALLS: &str = "moving walls do work on the fluid, which is not measured";
+/// Why the energy is not judged where obstacles or their surfaces move, of methods that do not note what walls do.
+pub const MOVING_WALLS: &str = "moving walls do work on the fluid, which this method does not measure";
 
 /// Why the energy is not judged of a fluid at rest without gravity.
 pub const NO_ENERGY: &str = "the fluid has no energy at the start to compare with";
@@ -53,12 +59,18 @@ pub const NO_ENERGY: &str = "the fluid has no energy at the start to compare wit
 pub struct Audit {
     /// Why the energy is not judged; `None` if it is.
     unjudged: Option<&'static str>,
-    /// The energy that excesses are compared with, J: that at the start, from the box's lowest corner.
+    /// The energy that excesses are compared with, J: the greatest since the start, from the box's lowest corner.
     reference: f64,
+    /// The part of that at the start which is due to the fluid's height, J.
+    height: f64,
     /// Kinetic and elastic energy at the start, J.
     at_start: f64,
-    /// Work of gravity since the start, J.
+    /// Work of gravity and of walls since the start, J.
     work: f64,
+    /// Work of walls since the start, J.
+    by_walls: f64,
+    /// The least that the energy has been, J, without what was at the start and the work since.
+    least: f64,
     /// The power of a field of gravity at the last step, W.
     power: f64,
     /// Sum of the places at the last step, m.
@@ -235,19 +247,26 @@ impl Audit {
             particles.position.iter().map(|x| field(x, core.time).length()).sum::<f64>()
                 * parameters.support_radius
         });
-        let reference = at_start + mass * (-g.dot(sums.places) - n * floor + of_field);
-        let moves = |o: &super::Obstacle| o.moving.is_some() || o.surface_velocity.is_some();
+        let height = mass * (-g.dot(sums.places) - n * floor + of_field);
+        let scale = n * mass * parameters.expected_speed.powi(2);
+        let is_moved = boundary.any_moves();
+        let reference = if is_moved { LEAST_GIVEN * scale } else { 0.0f64 }.max(at_start + height);
+        // without pressure at walls, all that they do is contacts
+        let is_noted = parameters.method.numerics().notes_reactions() || !parameters.walls_have_density();
         let unjudged = match () {
-            () if boundary.obstacles.iter().any(moves) => Some(MOVING_WALLS),
-            () if reference <= LEAST_ENERGY * n * mass * parameters.expected_speed.powi(2) => Some(NO_ENERGY),
+            () if is_moved && !is_noted => Some(MOVING_WALLS),
+            () if !is_moved && reference <= LEAST_ENERGY * scale => Some(NO_ENERGY),
             () => None,
         };
         let (compression, volume) = Compression::of(densities, parameters.rest_density);
         Self {
             unjudged,
             reference,
+            height,
             at_start,
             work: 0.0,
+            by_walls: 0.0,
+            least: 0.0,
             power: mass * sums.power,
             places: sums.places,
             excess: 0.0,
@@ -260,25 +279,40 @@ impl Audit {
         }
     }
 
-    /// Takes the figures of the state after a step of the length `dt`, s. `densities` are those that the
-    /// particles' places say, kg/m³.
+    /// Takes the figures of the state after a step of the length `dt`, s, in which walls did this work, J. `densities` are
+    /// those that the particles' places say, kg/m³.
     ///
     /// # Errors
     /// [`StepError::EnergyDoubled`] if the energy has doubled without work.
-    pub(super) fn look(&mut self, core: &Core, densities: &[f64], dt: f64) -> Result<(), StepError> {
+    pub(super) fn look(
+        &mut self,
+        core: &Core,
+        densities: &[f64],
+        dt: f64,
+        by_walls: f64,
+    ) -> Result<(), StepError> {
         let sums = Sums::of(core);
         let parameters = &core.parameters;
         let mass = parameters.particle_mass;
         let power = mass * sums.power;
-        self.work +=
+        let by_gravity =
             mass * parameters.gravity.dot(sums.places - self.places) + 0.5 * dt * (self.power + power);
+        self.work += by_gravity + by_walls;
+        self.by_walls += by_walls;
         (self.places, self.power) = (sums.places, power);
         (self.now.speed, self.max_speed) = (sums.fastest, self.max_speed.max(sums.fastest));
         if self.unjudged.is_none() {
             let energy = mass * (0.5 * sums.squares + sums.elastic);
-            // gravity that turns may bring in more than there was
-            self.reference = self.reference.max(self.at_start + self.work);
-            let excess = (energy - self.at_start - self.work) / self.reference;
+            let gained = energy - self.at_start - self.work;
+            // gravity that turns, and walls, may bring in more than there was
+            let (reference, least) = if core.boundary.any_moves() {
+                let height = self.height - (self.work - self.by_walls);
+                (energy + height, self.least.min(gained))
+            } else {
+                (self.at_start + self.work, 0.0)
+            };
+            (self.reference, self.least) = (self.reference.max(reference), least);
+            let excess = (gained - least) / self.reference;
             (self.now.excess, self.excess) = (excess, self.excess.max(excess));
             if excess > RUINOUS_EXCESS {
                 return Err(core.energy_doubled(excess));
@@ -296,10 +330,15 @@ impl Audit {
         Ok(())
     }
 
-    /// The greatest excess of the energy over that at the start and gravity's work, as a part of that at the
-    /// start; `None` if it is not judged, see [`Audit::unjudged`].
+    /// The greatest excess of the energy over that at the start and the work of gravity and walls, as a part of the greatest
+    /// energy so far; where walls work on the fluid, over the least that it has been. `None` if it is not judged, see [`Audit::unjudged`].
     pub fn energy_excess(&self) -> Option<f64> {
         self.unjudged.is_none().then_some(self.excess)
+    }
+
+    /// The work of walls that move on the fluid, J; zero if its energy is not judged.
+    pub fn wall_work(&self) -> f64 {
+        self.by_walls
     }
 
     /// Why the energy is not judged; `None` if it is.
@@ -342,7 +381,11 @@ impl Audit {
     pub fn findings(&self, kept: Option<f64>) -> Vec<(Finding, String)> {
         let percent = |x: f64| 100.0 * x;
         let energy = self.energy_excess().filter(|excess| *excess > MOST_EXCESS).map(|excess| {
-            format!("the energy was {:.1} % above that at the start and gravity's work", percent(excess))
+            let walls = if self.by_walls == 0.0 { "" } else { " and that of walls" };
+            format!(
+                "the energy was {:.1} % above that at the start and gravity's work{walls}",
+                percent(excess)
+            )
         });
         let change = self.volume_change;
         let volume = (change.abs() > MOST_VOLUME_CHANGE).then(|| {
@@ -382,8 +425,11 @@ impl Audit {
         let told = self.told.map(|told| f64::from(u8::from(told)));
         let numbers = [
             self.reference,
+            self.height,
+            self.least,
             self.at_start,
             self.work,
+            self.by_walls,
             self.power,
             x,
             y,
@@ -407,8 +453,11 @@ impl Audit {
         let Ok(
             [
                 reference,
+                height,
+                least,
                 at_start,
                 work,
+                by_walls,
                 power,
                 x,
                 y,
@@ -428,15 +477,18 @@ impl Audit {
                 speed,
                 told @ ..,
             ],
-        ) = <[f64; 23]>::try_from(memory)
+        ) = <[f64; 26]>::try_from(memory)
         else {
             return;
         };
         *self = Self {
             unjudged: self.unjudged,
             reference,
+            height,
+            least,
             at_start,
             work,
+            by_walls,
             power,
             places: DVec3::new(x, y, z),
             excess,

@@ -1,16 +1,23 @@
-//! Impulses that obstacles take from particles that they push or that hit them, as threads find them during a step.
+//! Impulses that obstacles take from particles that they push or that hit them, and the work of those that move, as threads
+//! find them during a step.
 
 use std::sync::{Mutex, PoisonError};
 
 use glam::DVec3;
 
-/// Impulses that obstacles have received from particles since the start.
+/// What obstacles and particles have done to each other since the start.
 #[derive(Debug, Default)]
 pub struct Contacts {
+    /// Whether a probe asks for forces. Otherwise only work is noted.
+    for_forces: bool,
     /// Impulse and moment of impulse about the origin of each obstacle, N·s and N·m·s.
     totals: Vec<[f64; 6]>,
     /// Hits of the present step, in the order in which threads find them.
     now: Mutex<Vec<Hit>>,
+    /// Work on particles in the present step, J/kg, with their indices.
+    work_now: Mutex<Vec<(usize, f64)>>,
+    /// Work of walls that move on the fluid, J, that was not taken yet.
+    work: f64,
 }
 
 /// A change of a particle's velocity by an obstacle.
@@ -25,13 +32,32 @@ struct Hit {
 impl Contacts {
     /// The state before any contact, for a number of obstacles.
     pub fn of(obstacles: usize) -> Self {
-        Self { totals: vec![[0.0; 6]; obstacles], now: Mutex::default() }
+        Self { totals: vec![[0.0; 6]; obstacles], ..Self::default() }
     }
 
-    /// Notes that an obstacle changed the velocity of a particle at a place.
+    /// Notes impulses from now on.
+    pub fn ask_for_forces(&mut self) {
+        self.for_forces = true;
+    }
+
+    /// Whether impulses are noted.
+    pub fn are_for_forces(&self) -> bool {
+        self.for_forces
+    }
+
+    /// Notes that an obstacle changed the velocity of a particle at a place, if a probe asks for forces.
     pub fn add(&self, particle: usize, obstacle: usize, change: DVec3, at: DVec3) {
-        let mut now = self.now.lock().unwrap_or_else(PoisonError::into_inner);
-        now.push(Hit { particle, obstacle, change, at });
+        if self.for_forces {
+            let mut now = self.now.lock().unwrap_or_else(PoisonError::into_inner);
+            now.push(Hit { particle, obstacle, change, at });
+        }
+    }
+
+    /// Notes the work of walls on a particle, J/kg.
+    pub fn add_work(&self, particle: usize, work: f64) {
+        if work != 0.0 {
+            self.work_now.lock().unwrap_or_else(PoisonError::into_inner).push((particle, work));
+        }
     }
 
     /// Adds the hits of the step to the totals, particle by particle, so that the sum does not depend on
@@ -47,6 +73,14 @@ impl Contacts {
                 *sum += x;
             }
         }
+        let now = self.work_now.get_mut().unwrap_or_else(PoisonError::into_inner);
+        now.sort_by_key(|(particle, _)| *particle);
+        self.work += mass * now.drain(..).map(|(_, work)| work).sum::<f64>();
+    }
+
+    /// The work of walls that move on the fluid, J, since this was asked last.
+    pub fn take_work(&mut self) -> f64 {
+        std::mem::take(&mut self.work)
     }
 
     /// Impulse, N·s, and moment of impulse about the origin, N·m·s, that an obstacle has received.

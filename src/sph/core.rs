@@ -57,7 +57,7 @@ pub(super) struct Core {
     /// The longest step, s, that the present pressure allows, by more than its acceleration; infinite if the
     /// method has no such limit.
     pub pressure_dt: f64,
-    /// Impulses of the fluid on obstacles, if a probe asks for them.
+    /// Impulses of the fluid on obstacles, if a probe asks for them, and the work of walls on it, if any move.
     pub contacts: Option<Contacts>,
     /// The longest step that was allowed so far, s.
     longest_dt: f64,
@@ -85,6 +85,7 @@ impl Core {
         acceleration.resize(particles.len());
         let speed = longest(&particles.velocity);
         let wall = parameters.method.numerics().wall(&parameters.scales());
+        let contacts = boundary.any_moves().then(|| Contacts::of(boundary.obstacles.len()));
         let clear = if boundary.obstacles.is_empty() { Vec::new() } else { vec![UNKNOWN; particles.len()] };
         Self {
             parameters,
@@ -98,7 +99,7 @@ impl Core {
             speed,
             sound: 0.0,
             pressure_dt: f64::INFINITY,
-            contacts: None,
+            contacts,
             longest_dt: 0.0,
             level: Level::new(),
             wall,
@@ -355,7 +356,7 @@ impl Core {
         checkpoint.set("density", particles.density.clone());
         checkpoint.set("pressure", particles.pressure.clone());
         checkpoint.set(SOUND, vec![self.sound]);
-        if let Some(contacts) = &self.contacts {
+        if let Some(contacts) = self.contacts.as_ref().filter(|contacts| contacts.are_for_forces()) {
             checkpoint.set("contacts", contacts.totals().as_flattened().to_vec());
         }
         checkpoint

@@ -1,6 +1,13 @@
-//! What walls do to particles in a step, noted for the obstacles that feel it.
+//! What walls do to particles in a step, noted for the obstacles that feel it, and for the work that it is.
 
-use super::{contacts::Contacts, core::Core, walls::Pushed};
+use super::{
+    contacts::Contacts,
+    core::Core,
+    walls::{Moving, Pushed, Share},
+};
+
+/// Steps for which the work of several walls on a particle is divided once.
+const TURNS: u32 = 8;
 
 /// The notes of a step. Forces of particles on each other cancel, so with what walls add to these, and with contacts, the
 /// momentum of the fluid changes by gravity and by what is noted alone. What surface tension does where it meets a wall is not
@@ -14,21 +21,51 @@ pub struct Reaction<'a> {
 }
 
 impl<'a> Reaction<'a> {
-    /// The notes of a step of the length `dt`, s; `None` if no probe asks for forces, if the method notes none, or for the
-    /// start of a run.
+    /// The notes of a step of the length `dt`, s; `None` if no probe asks for forces and no wall moves, if the method notes
+    /// none, or for the start of a run.
     pub fn of(core: &'a Core, dt: f64) -> Option<Self> {
         let is_noted = dt > 0.0 && core.parameters.method.numerics().notes_reactions();
         core.contacts.as_ref().filter(|_| is_noted).map(|contacts| Self { core, contacts, dt })
     }
 
-    /// Notes what walls do to a particle.
+    /// Whether the work of several walls on a particle is divided in this step.
+    fn is_turn_of(&self, i: usize) -> bool {
+        let id = u64::from(self.core.particles.id[i]);
+        (id + self.core.steps).is_multiple_of(u64::from(TURNS))
+    }
+
+    /// Notes what walls do to a particle. For work alone, what only one wall can have done is not divided. To divide what several
+    /// did takes long: it is all taken for that of the one that moves, and in one of [`TURNS`] steps what is wrong with this
+    /// is found, and counts for all of them.
     pub fn add(&self, i: usize, pushed: Pushed) {
         if pushed == Pushed::default() {
             return;
         }
-        let at = self.core.particles.position.get(i);
-        self.core.boundary.divide(self.core.wall(), at, &pushed, |obstacle, share| {
-            self.contacts.add(i, obstacle, self.dt * share, at);
-        });
+        let (at, wall, boundary) =
+            (self.core.particles.position.get(i), self.core.wall(), &self.core.boundary);
+        // pressure works by how a wall moves, and friction by how its surface does
+        let work = |obstacle: usize, share: Share| {
+            self.dt
+                * (share.by_pressure.dot(boundary.wall_velocity(obstacle, at))
+                    + share.by_friction.dot(boundary.velocity_along(obstacle, at)))
+        };
+        if self.contacts.are_for_forces() {
+            return boundary.divide(wall, at, &pushed, |obstacle, share| {
+                self.contacts.add_work(i, work(obstacle, share));
+                self.contacts.add(i, obstacle, self.dt * (share.by_pressure + share.by_friction), at);
+            });
+        }
+        let (moving, is_alone) = match boundary.moving_near(at, wall.h) {
+            Moving::Nothing => return,
+            Moving::Alone(moving) => (moving, true),
+            Moving::BesideOthers(moving) => (moving, false),
+        };
+        let roughly = work(moving, pushed.into());
+        self.contacts.add_work(i, roughly);
+        if !is_alone && self.is_turn_of(i) {
+            let mut exactly = 0.0;
+            boundary.divide(wall, at, &pushed, |obstacle, share| exactly += work(obstacle, share));
+            self.contacts.add_work(i, f64::from(TURNS) * (exactly - roughly));
+        }
     }
 }

@@ -160,7 +160,8 @@ impl Simulation {
         let counted = |steps: u64| steps as f64 * dt;
         self.core.time =
             if self.core.time == counted(before) { counted(before + 1) } else { self.core.time + dt };
-        self.audit.look(&self.core, self.scheme.densities(&self.core), dt)
+        let by_walls = self.core.contacts.as_mut().map_or(0.0, Contacts::take_work);
+        self.audit.look(&self.core, self.scheme.densities(&self.core), dt, by_walls)
     }
 
     /// The greatest speed after the last step, m/s.
@@ -277,7 +278,7 @@ impl Simulation {
         checkpoint: &Checkpoint,
         memory: &[f64],
     ) -> Result<Gauge, SetupError> {
-        let is_first = self.core.contacts.is_none();
+        let is_first = !self.core.contacts.as_ref().is_some_and(Contacts::are_for_forces);
         self.prepare(probe)?;
         if let (true, Some(contacts), Ok(totals)) =
             (is_first, &mut self.core.contacts, checkpoint.get("contacts"))
@@ -293,7 +294,7 @@ impl Simulation {
             if obstacle >= obstacles {
                 return Err(SetupError::NoObstacle { index: obstacle, obstacles });
             }
-            self.core.contacts.get_or_insert_with(|| Contacts::of(obstacles));
+            self.core.contacts.get_or_insert_with(|| Contacts::of(obstacles)).ask_for_forces();
         }
         Ok(())
     }

@@ -60,6 +60,7 @@ mod tool;
 mod triangle_solids;
 mod validation;
 mod view;
+mod wall_work;
 mod walls;
 mod watching;
 mod waves;

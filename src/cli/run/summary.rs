@@ -39,9 +39,14 @@ pub(super) struct Summary {
     kinetic_energy: f64,
     potential_energy: f64,
     energy_at_start: f64,
-    /// The greatest excess of the energy over that at the start and gravity's work, as a part of the energy at
-    /// the start, after any step; null if it cannot be judged.
+    /// The greatest excess of the energy over that at the start and the work of gravity and walls, as a part of the greatest
+    /// energy so far, after any step; null if it cannot be judged.
     energy_excess: Option<f64>,
+    /// Why it cannot be judged.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    energy_unjudged: Option<&'static str>,
+    /// The work of walls that move on the fluid, J.
+    wall_work: f64,
     /// The largest change of the fluid's volume by the places of its particles, as a part of it.
     volume_change: f64,
     /// The largest mean compression by the places of the particles, as a part of the rest density.
@@ -110,6 +115,8 @@ impl Summary {
             potential_energy: watch.now.potential_energy,
             energy_at_start: watch.energy_at_start,
             energy_excess: audit.energy_excess(),
+            energy_unjudged: audit.unjudged(),
+            wall_work: audit.wall_work(),
             volume_change: audit.volume_change(),
             compression_mean: compression.mean,
             compression_p99: compression.p99,
@@ -159,9 +166,14 @@ pub(super) fn print(summary: &Summary, frames: &Frames, probes: &Probes) {
         "energy: {} J at the start, {} J at the end; {}",
         readable(summary.energy_at_start),
         readable(summary.kinetic_energy + summary.potential_energy),
-        match summary.energy_excess {
-            Some(excess) => format!("never more than {:.2e} of it above what gravity gave", excess),
-            None => "not judged".to_string(),
+        match (summary.energy_excess, summary.energy_unjudged) {
+            (Some(excess), _) if summary.wall_work != 0.0 => format!(
+                "walls gave {} J; never more than {excess:.2e} of the most from nowhere",
+                readable(summary.wall_work)
+            ),
+            (Some(excess), _) => format!("never more than {excess:.2e} of it above what gravity gave"),
+            (None, Some(why)) => format!("not judged: {why}"),
+            (None, None) => "not judged".to_string(),
         }
     );
     say!(

@@ -108,6 +108,11 @@ impl Obstacle {
             surface_velocity: None,
         }
     }
+
+    /// Whether it moves, or its surface does.
+    pub(in crate::sph) fn moves(&self) -> bool {
+        self.moving.is_some() || self.surface_velocity.is_some()
+    }
 }
 
 /// The box and the bodies in it.
@@ -161,14 +166,22 @@ impl Boundary {
         REACH * self.clearance
     }
 
+    /// Whether any wall moves, by its motion or within its surface, and so does work on the fluid.
+    pub fn any_moves(&self) -> bool {
+        self.obstacles.iter().any(Obstacle::moves)
+    }
+
+    /// The velocity of an obstacle's wall near a point, m/s; zero if it is at rest.
+    pub fn wall_velocity(&self, k: usize, p: DVec3) -> DVec3 {
+        if self.obstacles[k].moving.is_some() { self.field(k).wall_velocity(p) } else { DVec3::ZERO }
+    }
+
     /// The velocity along an obstacle's surface near a point, m/s, of which only the part in the surface has a meaning: what
     /// the scene states, or that of the body's motion.
     pub fn velocity_along(&self, k: usize, p: DVec3) -> DVec3 {
-        let obstacle = &self.obstacles[k];
-        match &obstacle.surface_velocity {
+        match &self.obstacles[k].surface_velocity {
             Some(velocity) => velocity(p, self.time),
-            None if obstacle.moving.is_some() => self.field(k).wall_velocity(p),
-            None => DVec3::ZERO,
+            None => self.wall_velocity(k, p),
         }
     }
 
@@ -178,7 +191,7 @@ impl Boundary {
     }
 
     /// Moves particles from `position` to `target`, and corrects target and velocity where they collide.
-    /// Changes of velocity by obstacles are added to `contacts`, if given. `clear` holds for each particle
+    /// What obstacles do to the particles is added to `contacts`, if given. `clear` holds for each particle
     /// its least distance from all obstacles, m, or [`UNKNOWN`]; it is empty if there are no obstacles.
     ///
     /// # Errors
@@ -409,14 +422,16 @@ impl Boundary {
                 block.clear[k] = if at_rest { left } else { UNKNOWN };
                 continue;
             }
+            let hit = |obstacle, change: DVec3, wall: DVec3, at| {
+                if let Some(contacts) = contacts {
+                    contacts.add(block.first + k, obstacle, change, at);
+                    contacts.add_work(block.first + k, change.dot(wall));
+                }
+            };
             let (at, velocity) = self
-                .resolve(from, to, block.velocity(k), |obstacle, change, at| {
-                    if let Some(contacts) = contacts {
-                        contacts.add(block.first + k, obstacle, change, at);
-                    }
-                })
+                .resolve(from, to, block.velocity(k), hit)
                 .map_err(Trouble::from)
-                .and_then(|end| self.leave_moving(from, end.at, end.velocity, end.is_proven))
+                .and_then(|end| self.leave_moving(from, end, hit))
                 .map_err(|trouble| block.fault(k, trouble))?;
             // a point of a path may lie a rounding error beyond both of its ends
             block.put(k, at.clamp(self.domain.min, self.domain.max), velocity);

@@ -24,7 +24,7 @@ pub(super) struct End {
 
 impl Boundary {
     /// Where the path of a particle ends, and the velocity there. `hit` is called for each contact with the
-    /// obstacle's number, the change of velocity, and the place.
+    /// obstacle's number, the change of velocity, the velocity of the wall, and the place.
     ///
     /// A wall that moves takes the particle with it for the rest of the step: what is left of the path is passed relative to
     /// the wall, and searched from the instant of the contact on.
@@ -33,7 +33,7 @@ impl Boundary {
         from: DVec3,
         to: DVec3,
         velocity: DVec3,
-        hit: impl Fn(usize, DVec3, DVec3),
+        hit: impl Fn(usize, DVec3, DVec3, DVec3),
     ) -> Result<End, Undefined> {
         let (mut here, mut since, mut target, mut velocity) = (from, 0.0, to, velocity);
         for _ in 0..MAX_CONTACTS {
@@ -45,8 +45,7 @@ impl Boundary {
             let (obstacle, field) = (&self.obstacles[index], self.field(index));
             let before = velocity;
             // the bounce depends on the velocity relative to the wall
-            let wall =
-                if obstacle.moving.is_some() { field.wall_velocity(contact.point) } else { DVec3::ZERO };
+            let wall = self.wall_velocity(index, contact.point);
             if !wall.is_finite() {
                 return Err(Undefined { at: contact.point });
             }
@@ -69,7 +68,7 @@ impl Boundary {
                 target = lifted;
                 velocity = wall + reflect(velocity - wall, normal, obstacle.restitution);
             }
-            hit(index, velocity - before, contact.point);
+            hit(index, velocity - before, wall, contact.point);
         }
         // a wall that moves on may pass what cannot go on
         let is_proven = self.stays_outside(here, since)?;

@@ -36,6 +36,30 @@ pub(in crate::sph) struct Pushed {
     pub by_friction: DVec3,
 }
 
+/// The part of one obstacle in that, m/s².
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub(in crate::sph) struct Share {
+    pub by_pressure: DVec3,
+    pub by_friction: DVec3,
+}
+
+impl From<Pushed> for Share {
+    /// All of it.
+    fn from(Pushed { by_pressure, by_friction, .. }: Pushed) -> Self {
+        Self { by_pressure, by_friction }
+    }
+}
+
+/// What moves near a particle.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(in crate::sph) enum Moving {
+    Nothing,
+    /// One obstacle, and no other wall is near.
+    Alone(usize),
+    /// An obstacle, and other walls are near, which may move too.
+    BesideOthers(usize),
+}
+
 /// A wall near a particle.
 struct Near {
     /// Its number; `None` for the box.
@@ -70,7 +94,7 @@ impl Facing {
 }
 
 impl Boundary {
-    /// Divides what walls do to a particle among the obstacles near it, and tells the acceleration by each, m/s².
+    /// Divides what walls do to a particle among the obstacles near it, and tells the share of each.
     ///
     /// Each wall presses as if it were alone, with p·∇λ of its own; in a corner as [`Corner`] says. What the walls together
     /// press less, because they overlap in a corner, acts along them: it is what the mirror image in one wall lacks behind the
@@ -83,11 +107,11 @@ impl Boundary {
     ///
     /// Friction is divided among the walls to which the fluid sticks, by the directions along them. All shares, that of the
     /// box included, add up to the whole.
-    pub fn divide(&self, wall: &Wall, p: DVec3, pushed: &Pushed, mut tell: impl FnMut(usize, DVec3)) {
+    pub fn divide(&self, wall: &Wall, p: DVec3, pushed: &Pushed, mut tell: impl FnMut(usize, Share)) {
         let mut near = self.near(wall, p);
         if let [] | [_] = &near[..] {
             if let Some(obstacle) = near.first().and_then(|only| only.obstacle) {
-                tell(obstacle, pushed.by_pressure + pushed.by_friction);
+                tell(obstacle, (*pushed).into());
             }
             return;
         }
@@ -109,9 +133,20 @@ impl Boundary {
             if rubs { solved(sum(Near::along, |near| near.sticks), by_friction) } else { DVec3::ZERO };
         for near in &near {
             let Some(obstacle) = near.obstacle else { continue };
-            let rubbed = if near.sticks { near.along() * friction } else { DVec3::ZERO };
-            tell(obstacle, pressed(near) + share(near) * left + rubbed);
+            let by_friction = if near.sticks { near.along() * friction } else { DVec3::ZERO };
+            tell(obstacle, Share { by_pressure: pressed(near) + share(near) * left, by_friction });
         }
+    }
+
+    /// What moves nearer to a place than h, m.
+    pub fn moving_near(&self, p: DVec3, h: f64) -> Moving {
+        let place = Aabb::new(p, p);
+        let is_near = |k: &usize| !self.field(*k).is_far(&place, h);
+        let mut moving = (0..self.obstacles.len()).filter(|k| self.obstacles[*k].moves()).filter(is_near);
+        let Some(first) = moving.next() else { return Moving::Nothing };
+        let in_the_open = self.domain.union(&place.grown(h)) == self.domain;
+        let is_alone = in_the_open && !(0..self.obstacles.len()).filter(|k| *k != first).any(|k| is_near(&k));
+        if is_alone { Moving::Alone(first) } else { Moving::BesideOthers(first) }
     }
 
     /// The faces near a particle, with the numbers of their walls, but for those behind another wall, which has what they
@@ -396,7 +431,7 @@ mod tests {
     fn shares(boundary: &Boundary, p: DVec3, pushed: Pushed) -> [DVec3; 2] {
         let mut shares = [DVec3::ZERO; 2];
         let wall = Wall::new(WallKernel::WendlandC2, 1.0, 0.5);
-        boundary.divide(&wall, p, &pushed, |k, share| shares[k] += share);
+        boundary.divide(&wall, p, &pushed, |k, share| shares[k] += share.by_pressure + share.by_friction);
         shares
     }
 
@@ -437,7 +472,7 @@ mod tests {
         let gradient = DVec3::new(-thin, 0.0, -slope(0.3));
         let pushed = Pushed { by_pressure: -4.0 * gradient, factor: -4.0, gradient, ..Pushed::default() };
         let mut shares = DVec3::ZERO;
-        boundary.divide(&wall, p, &pushed, |_, share| shares += share);
+        boundary.divide(&wall, p, &pushed, |_, share| shares += share.by_pressure + share.by_friction);
         // a block as deep as the kernel would press with all of its slope, 3.4 times as much
         assert!((shares.x - 4.0 * thin).abs() < 0.02 * thin, "{shares} {thin}");
     }
@@ -473,7 +508,7 @@ mod tests {
         let above = Boundary { obstacles: vec![sticky(plate(0.1, 0.2))], ..boundary(9.0) };
         let mut shares = DVec3::ZERO;
         let wall = Wall::new(WallKernel::WendlandC2, 1.0, 0.5);
-        above.divide(&wall, p, &pushed, |_, share| shares += share);
+        above.divide(&wall, p, &pushed, |_, share| shares += share.by_pressure + share.by_friction);
         assert!(shares.z > 0.1 && shares.z < 4.9, "{shares}");
     }
 

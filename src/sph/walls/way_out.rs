@@ -13,6 +13,7 @@ use crate::field::Path;
 use super::{
     boundary::Boundary,
     contact::{Trouble, Undefined, first_contact, push_out_to, reflect},
+    flight::End,
 };
 
 /// Most walls that push a particle on, one after the other.
@@ -28,14 +29,14 @@ const BEGINNING: f64 = 4.0;
 const DISTANCES: i32 = 13;
 
 impl Boundary {
-    /// Moves a particle out of all obstacles at the end of a step in which it came from `from` to `at`, and
-    /// gives it the velocity that their walls leave it. `is_proven` says that no wall can have passed it.
+    /// Moves a particle out of all obstacles at the end of a step in which it came from `from`, and gives it the velocity that
+    /// their walls leave it. `hit` is called for each of them with its number, the change of velocity, the velocity of the wall,
+    /// and the place.
     pub(super) fn leave_moving(
         &self,
         from: DVec3,
-        at: DVec3,
-        mut velocity: DVec3,
-        is_proven: bool,
+        End { at, mut velocity, is_proven }: End,
+        hit: impl Fn(usize, DVec3, DVec3, DVec3),
     ) -> Result<(DVec3, DVec3), Trouble> {
         if self.all_at_rest() || is_proven && self.first_around(at)?.is_none() {
             return Ok((at, velocity));
@@ -49,9 +50,10 @@ impl Boundary {
             if field.omega(at) < 0.0 {
                 continue;
             }
-            let wall = if obstacle.moving.is_some() { field.wall_velocity(out) } else { DVec3::ZERO };
+            let (wall, before) = (self.wall_velocity(k, out), velocity);
             let normal = (-field.omega_grad(out).1).try_normalize().unwrap_or((out - at).normalize_or_zero());
             velocity = wall + reflect(velocity - wall, normal, obstacle.restitution);
+            hit(k, velocity - before, wall, out);
         }
         Ok((out, velocity))
     }
@@ -87,9 +89,7 @@ impl Boundary {
         let mut path = Path::new(from, to, obstacle.resolution);
         for later in 0..LATER {
             let Some(contact) = first_contact(field, &path, self.clearance)? else { return Ok(true) };
-            let wall =
-                if obstacle.moving.is_some() { field.wall_velocity(contact.point) } else { DVec3::ZERO };
-            let way = to - from - self.step * wall;
+            let way = to - from - self.step * self.wall_velocity(k, contact.point);
             if contact.fraction > path.start {
                 return Ok(false);
             }

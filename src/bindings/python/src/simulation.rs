@@ -429,6 +429,7 @@ impl PySimulation {
         CLASS.import(py, "rfm._records", "Audit")?.call1((
             audit.energy_excess(),
             audit.unjudged(),
+            audit.wall_work(),
             audit.volume_change(),
             compression.mean,
             compression.p99,

@@ -67,6 +67,7 @@ class Collisions(NamedTuple):
 class Audit(NamedTuple):
     energy_excess: float | None
     unjudged: str | None
+    wall_work: float
     volume_change: float
     compression_mean: float
     compression_p99: float

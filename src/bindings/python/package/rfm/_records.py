@@ -45,6 +45,7 @@ Audit = namedtuple(
     [
         "energy_excess",
         "unjudged",
+        "wall_work",
         "volume_change",
         "compression_mean",
         "compression_p99",
@@ -56,7 +57,8 @@ Audit = namedtuple(
 Audit.__module__ = "rfm"
 Audit.__doc__ = """What a simulation has shown since its start; the worst figures, as parts, and speeds in m/s.
 
-``energy_excess`` is None if the energy is not judged; ``unjudged`` then says why. ``findings`` are sentences about
+``energy_excess`` is None if the energy is not judged; ``unjudged`` then says why. ``wall_work`` is the
+work of walls that move on the fluid, in J. ``findings`` are sentences about
 what a user must know.
 """
 
