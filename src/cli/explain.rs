@@ -5,10 +5,11 @@ use std::path::Path;
 use glam::DVec3;
 
 use super::args::{Explain, Shared, Stage};
+use super::language::{page, words::is_of_a_word};
 use super::run::{experiment, start};
 use super::{Failure, choose, input};
 use rfm::codegen::{CodegenError, Listing, Request, Shape, target_description};
-use rfm::diagnostic::{Span, explain, explanations};
+use rfm::diagnostic::{Span, explain, explanations, nearest};
 use rfm::geom::Aabb;
 use rfm::interval::Interval;
 use rfm::ir::{Node, dump};
@@ -44,6 +45,25 @@ pub(super) fn run(shared: &Shared, options: &Explain) -> Result<(), Failure> {
     let is_code = subject.len() == 5 && subject.starts_with(['E', 'W']) && !Path::new(subject).exists();
     if is_code && subject[1..].bytes().all(|b| b.is_ascii_digit()) {
         return Err(Failure::usage(format!("there is no message {subject}: `rfm explain codes` lists all")));
+    }
+    let is_file = Path::new(choose::subject(subject).0).exists();
+    if subject == "words" && !is_file {
+        say!("{}", page::all().trim_end());
+        return Ok(());
+    }
+    if let Some(text) = page::of(subject).filter(|_| !is_file) {
+        say!("{}", text.trim_end());
+        return Ok(());
+    }
+    let is_word = subject.trim_start_matches('.').chars().all(is_of_a_word);
+    if is_word && !is_file {
+        let names = page::names();
+        let near = nearest(subject, names.iter().map(String::as_str));
+        let near = near.map_or(String::new(), |near| format!("; did you mean `{near}`?"));
+        return Err(Failure::usage(format!(
+            "there is no word and no file `{subject}`{near} (`rfm explain words` lists all words, `rfm explain codes` all \
+             messages)"
+        )));
     }
     let (path, name) = choose::subject(subject);
     let program = input::program(shared, path)?;

@@ -84,6 +84,7 @@ pub(super) fn of_solid(
     let mut found: Vec<Diagnostic> = idle.spans.into_iter().map(|span| subject.idle(span)).collect();
     found.extend(jumps.iter().map(|jump| subject.jump(jump)));
     found.extend(singular.iter().map(|place| subject.singular(place)));
+    found.extend(solid.seam().map(|at| subject.seam(at)));
     // where a formula jumps, differences say nothing of its gradient
     if jumps.is_empty() {
         found.extend(solid.uneven_operands().first().map(|uneven| subject.uneven(uneven)));
@@ -171,6 +172,12 @@ impl<'a> Subject<'a> {
         }
     }
 
+    fn seam(&self, at: DVec3) -> Diagnostic {
+        let message = format!("ω of solid `{}` is 0 within it, at {}", self.name, point(at));
+        self.warning(Code::SEAM, self.text, message, "there is a surface without an outside".into())
+            .help("draw an outline that is turned beyond its axis: to x < 0 for `.revolve()`")
+    }
+
     fn jump(&self, jump: &Break) -> Diagnostic {
         let (how, help) = match jump.what {
             Breakage::Jump => {
@@ -215,15 +222,40 @@ pub(super) fn of_scenes(
         }
         let spacing = experiment::spacing(program, scene, engine)?;
         let first = usize::from(scene.container.is_some());
+        let mut solids = Vec::new();
         for (k, obstacle) in scene.obstacles.iter().enumerate() {
             let solid = program.compile(&obstacle.name, obstacle.shape, engine)?.at(0.0);
             let wall = wall_limit(scene, first + k);
             let search = (obstacle.shape, [wall * spacing, spacing], scene.domain);
             found.extend(too_thin((scene, spacing), obstacle, wall, searches.thin_parts(&solid, search)));
+            solids.push(solid);
         }
+        let fluid = program.compile(&scene.fluid.name, scene.fluid.shape, engine)?.at(0.0);
+        found.extend(in_obstacles(scene, &fluid, &solids));
     }
     Ok(found)
 }
+
+/// A warning if a large part of the fluid's shape lies in obstacles, and an error if all of it does. Where obstacles stand in a
+/// fluid that is drawn as if they were not there, as posts in a tank do, they take less.
+fn in_obstacles(scene: &Scene, fluid: &Solid, obstacles: &[Solid]) -> Option<Diagnostic> {
+    let part = experiment::part_in_obstacles(fluid, obstacles, &scene.domain)?;
+    let (span, help) = (scene.fluid.shape_span, "move the shape of the fluid out of the obstacles");
+    if part == 1.0 {
+        let message = "no particle finds room: all of the fluid's shape lies in obstacles";
+        return Some(Diagnostic::error(Code::OBSTACLE_FILLS_BOX, span, message).help(help));
+    }
+    (part > MUCH).then(|| {
+        let message = format!(
+            "{:.0} % of the fluid's shape lies in obstacles, where no particle is placed",
+            100.0 * part
+        );
+        Diagnostic::warning(Code::FLUID_IN_OBSTACLE, span, message).help(help)
+    })
+}
+
+/// Part of a fluid's shape in obstacles from which on it is told of.
+const MUCH: f64 = 0.25;
 
 /// Warnings about the bodies of an experiment that its fluid would meet: places at which their formulas jump or have no
 /// value, and walls and gaps that its particles are too large for.

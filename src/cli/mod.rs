@@ -19,6 +19,7 @@ mod findings;
 mod fmt;
 mod init;
 mod input;
+mod language;
 mod lints;
 mod lsp;
 mod manual;

@@ -241,6 +241,13 @@ SINGULAR = "W0418":
 "Outside of the solid, in the scene that has it as an obstacle or close to it, ω has no value: a divisor is zero there, or a
 root or a logarithm is taken of a negative number. What comes near is neither inside nor outside, and a run stops there. Keep
 the formula away from that place by `max`, or choose another one by `where`: `where(x > 0, ln(max(x, 1e-9)), -20)`.";
+SEAM = "W0420":
+"ω is zero on a line or a face within the solid. Values there count as outside, distances and contacts know a surface there, and a
+mesh may have a hole. Most often an outline that is turned about an axis has an edge on it: draw it beyond the axis, which hides
+that edge.
+
+    rfm 1
+    solid can = polygon([[-0.1, 0], [0.5, 0], [0.5, 1], [-0.1, 1]]).revolve()";
 NO_EDGE = "W0419":
 "`.round(radius)` makes arcs of the edges at which the parts of a shape are joined by `and`, `or` and `\\`. This shape is one
 formula, or its parts are joined further inside: `min`, `max` and `blend` keep their edges, and `.taper` makes one formula of what it
@@ -286,8 +293,8 @@ LONG_STEP = "W0503":
 "The time step is longer than what is stable when particles fall through the whole box. The run may still go well if
 they never become so fast; without `dt` a stable step is derived.";
 ENERGY_GREW = "W0511":
-"The run's energy rose by more than 1 % above what it had at the start and gravity's work since then. No fluid does
-that: the method made energy of its errors. What moves faster or higher than it could is wrong from then on. More particles,
+"The run's energy rose by more than 1 % above what it had at the start and the work of gravity and of moving walls since then;
+where walls move, by more than 1 % of the greatest energy so far above what was left of that. No fluid does that: the method made energy of its errors. What moves faster or higher than it could is wrong from then on. More particles,
 more `artificial_viscosity` (wcsph), or the other method may help; `energy_excess` in the summary has the largest value, and
 the probe `audit` shows when it arose. A run whose energy doubles stops.";
 VOLUME_CHANGED = "W0512":

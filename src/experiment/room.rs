@@ -3,6 +3,7 @@
 use glam::DVec3;
 
 use super::{Experiment, refuse};
+use crate::Solid;
 use crate::compile::Error;
 use crate::diagnostic::{Code, Diagnostic, Span};
 use crate::field::Field;
@@ -293,6 +294,26 @@ impl Experiment {
             scene.fluid.particles.map(|wanted| ((wanted as f64 / factor) as usize).max(1));
         Self::of_scene(self.program.clone(), scene, engine)
     }
+}
+
+/// The part of a fluid's shape within a box that lies in obstacles at the start, found by samples; `None` if they meet
+/// nothing of the shape.
+pub fn part_in_obstacles(fluid: &Solid, obstacles: &[Solid], domain: &Aabb) -> Option<f64> {
+    let within = match fluid.bounds() {
+        Bounds::Within(bounds) => bounds.intersection(domain),
+        Bounds::Unbounded => *domain,
+        Bounds::Empty => return None,
+    };
+    if within.is_empty() {
+        return None;
+    }
+    let is_taken = |p: DVec3| obstacles.iter().any(|obstacle| obstacle.omega(p) >= 0.0);
+    let (mut all, mut taken) = (0.0, 0.0);
+    for p in samples(&within).filter(|p| fluid.omega(*p) > 0.0) {
+        all += 1.0;
+        taken += f64::from(u8::from(is_taken(p)));
+    }
+    (all > 0.0).then(|| taken / all)
 }
 
 /// Points in the middles of equal cells that fill a box.

@@ -282,7 +282,7 @@ fn number(name: &str, a: &[&str]) -> Option<Words> {
         "cot" => written("a formula here", &format!("1/tan({first})")),
         "sgn" | "signum" => written("`sign` here", &format!("sign({first})")),
         "rand" | "rands" => written("`random(seed, i)` here", "random(1, i)"),
-        "noise" | "snoise" | "perlin" => words("there is no noise", "add waves: `0.05*sin(20*x)*sin(20*y)`"),
+        "snoise" | "perlin" | "simplex" => written("`noise` here", "noise([x, y, z])"),
         "radians" | "deg2rad" | "deg" => written("a unit here", &format!("{first} deg")),
         "degrees" | "rad2deg" => written("a unit here", &format!("({first})*180/pi")),
         "vec3" | "vec" | "vector" | "Vector" | "DVec3" | "float3" | "point" | "vec2" | "vec4" => match a {

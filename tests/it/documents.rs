@@ -2,10 +2,11 @@
 
 use crate::tool::{rfm, rfm_reading, root};
 
-const DOCUMENTS: [&str; 12] = [
+const DOCUMENTS: [&str; 13] = [
     "README.md",
     "CHANGELOG.md",
     "grammar/README.md",
+    "grammar/words.md",
     "examples/README.md",
     "examples/lammps/README.md",
     "examples/validation/README.md",
@@ -176,6 +177,7 @@ fn one_script_makes_every_picture_of_the_gallery() {
             match (words.next()?, words.next()?) {
                 ("section", name) => Some(format!("{name}-slice.png")),
                 ("flow", name) if !name.contains('$') => Some(format!("{name}.png")),
+                ("view", name) => Some(format!("{name}.png")),
                 ("truth", name) => Some(format!("validation/{name}.png")),
                 _ => None,
             }
@@ -202,6 +204,16 @@ fn one_script_makes_every_picture_of_the_gallery() {
 fn the_first_page_stays_short() {
     let lines = text("README.md").lines().count();
     assert!(lines <= 300, "{lines} lines");
+}
+
+#[test]
+fn the_words_are_listed_as_they_are_declared() {
+    let page = rfm(root(), &["explain", "words"]).expect(0).stdout;
+    assert_eq!(page, text("grammar/words.md"), "write the output of `rfm explain words` there");
+    let one = rfm(root(), &["explain", "twist"]).expect(0).stdout;
+    assert!(one.starts_with("- `twist(shape, turns)`: ") && one.contains("`shape.twist(turns)`"), "{one}");
+    let unknown = rfm(root(), &["explain", "twisst"]).expect(2);
+    assert!(unknown.stderr.contains("did you mean `twist`?"), "{}", unknown.stderr);
 }
 
 #[test]

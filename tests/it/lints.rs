@@ -335,3 +335,25 @@ fn a_run_tells_of_what_its_fluid_meets() {
         assert!(!later.contains(code), "{later}");
     }
 }
+
+/// An outline with an edge on the axis is a surface there once it is turned, wherever the body stands then.
+#[test]
+fn seams_of_turned_outlines_are_found() {
+    let can = "polygon([[0, 0], [0.5, 0], [0.5, 1], [0, 1]]).revolve()";
+    for text in
+        [can.to_string(), format!("{can}.move([3, 1, 0])"), format!("{can}.rotate_x(90°).move([0, 2, 1])")]
+    {
+        let solid = solid(&text);
+        let at = solid.seam().unwrap_or_else(|| panic!("{text} has none"));
+        assert_eq!(solid.omega(at), 0.0, "{text}");
+    }
+    for sound in [
+        "polygon([[-0.1, 0], [0.5, 0], [0.5, 1], [-0.1, 1]]).revolve()",
+        "box([0, 0, 0], [1, 1, 1]) or box([1, 0, 0], [2, 1, 1])",
+        "sphere(1)",
+        "torus(1, 0.25)",
+        "cylinder(1, 1) \\ cylinder(0.2, 3).move([0, 0, -1])",
+    ] {
+        assert_eq!(solid(sound).seam(), None, "{sound}");
+    }
+}

@@ -9,7 +9,7 @@ use rfm::sph::{KeyInfo, Method, method_reference};
 /// there; meaning.
 type Rows = &'static [(&'static str, &'static str, &'static str, &'static str)];
 
-/// All blocks with their keys.
+/// All blocks with their keys; `None` is the scene itself.
 const BLOCKS: &[(Option<&str>, Rows)] = &[
     (None, SCENE),
     (Some("box"), BOX),
@@ -153,7 +153,7 @@ const PICTURE: Rows = &[
 
 /// What a key of a block means under a method; empty if there is no such key. `None` is the block of the scene itself, or
 /// an unknown method.
-pub(super) fn about(block: Option<&str>, key: &str, method: Option<Method>) -> String {
+pub(in crate::cli) fn about(block: Option<&str>, key: &str, method: Option<Method>) -> String {
     let declared = |method: Method| {
         method.info().keys.into_iter().find(|own| own.name == key && Some(own.block.name()) == block)
     };
@@ -183,8 +183,13 @@ pub(super) fn about(block: Option<&str>, key: &str, method: Option<Method>) -> S
     words
 }
 
+/// The names of all blocks; `None` is the scene itself.
+pub(in crate::cli) fn blocks() -> impl Iterator<Item = Option<&'static str>> {
+    BLOCKS.iter().map(|(name, _)| *name)
+}
+
 /// What a word that is the value of a key means: so far those of `method`.
-pub(super) fn about_word(key: &str, word: &str) -> Option<String> {
+pub(in crate::cli) fn about_word(key: &str, word: &str) -> Option<String> {
     if key != "method" {
         return None;
     }

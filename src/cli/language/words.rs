@@ -5,7 +5,7 @@ use rfm::syntax::ast::{Function, Item};
 
 /// A word with its parameters.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub(super) struct Signature {
+pub(in crate::cli) struct Signature {
     pub name: String,
     pub parameters: Vec<String>,
     pub about: String,
@@ -19,12 +19,12 @@ impl Signature {
 }
 
 /// Whether a sign may stand in a word, as the grammar has it: exponents such as `²` may not.
-pub(super) fn is_of_a_word(c: char) -> bool {
+pub(in crate::cli) fn is_of_a_word(c: char) -> bool {
     c.is_alphabetic() || c.is_ascii_digit() || c == '_'
 }
 
 /// What begins an item, and what it defines.
-pub(super) const ITEMS: [(&str, &str); 6] = [
+pub(in crate::cli) const ITEMS: [(&str, &str); 6] = [
     ("import", "what another file defines: `import \"chess.rfm\" as chess`"),
     ("param", "a number that the command line may set, within its range"),
     ("let", "a name for an expression"),
@@ -135,7 +135,7 @@ const METHODS: &[(&str, &str)] = &[
 ];
 
 /// The functions of the language, standard solids among them.
-pub(super) fn functions() -> Vec<Signature> {
+pub(in crate::cli) fn functions() -> Vec<Signature> {
     let builtin = |name: &'static str| {
         let (parameters, about) =
             FUNCTIONS.iter().find(|known| known.0 == name).map_or(("…", ""), |known| (known.1, known.2));
@@ -151,7 +151,7 @@ pub(super) fn functions() -> Vec<Signature> {
 }
 
 /// The methods of shapes that the language has.
-pub(super) fn methods() -> Vec<Signature> {
+pub(in crate::cli) fn methods() -> Vec<Signature> {
     let builtin = |(name, parameters): (&'static str, &'static [&'static str])| {
         let about = METHODS.iter().find(|known| known.0 == name).map_or("", |known| known.1);
         let parameters = parameters.iter().map(ToString::to_string).collect();
@@ -166,7 +166,7 @@ pub(super) fn methods() -> Vec<Signature> {
 }
 
 /// The signature of a function of a text, with the comment above it.
-pub(super) fn of(function: &Function, text: &str) -> Signature {
+pub(in crate::cli) fn of(function: &Function, text: &str) -> Signature {
     let parameter = |p: &rfm::syntax::ast::Parameter| {
         let default = p.default.as_ref().and_then(|value| text.get(value.span.range()));
         default.map_or_else(|| p.name.text.clone(), |default| format!("{} = {default}", p.name.text))
@@ -179,13 +179,13 @@ pub(super) fn of(function: &Function, text: &str) -> Signature {
 }
 
 /// The signature without the shape in front of the dot.
-pub(super) fn behind_a_shape(mut signature: Signature) -> Signature {
+pub(in crate::cli) fn behind_a_shape(mut signature: Signature) -> Signature {
     signature.parameters.remove(0);
     signature
 }
 
 /// The lines of comments directly above the line of a byte, without their signs.
-pub(super) fn comment_above(text: &str, byte: usize) -> String {
+pub(in crate::cli) fn comment_above(text: &str, byte: usize) -> String {
     let before = text.get(..byte).unwrap_or("");
     let above = &before[..before.rfind('\n').map_or(0, |at| at + 1)];
     let mut lines: Vec<&str> = Vec::new();

@@ -15,8 +15,10 @@ use rfm::syntax::{
 
 use super::context::{Context, Open};
 use super::document::Document;
-use super::keys;
-use super::words::{self, Signature, is_of_a_word};
+use crate::cli::language::{
+    keys,
+    words::{self, Signature, is_of_a_word},
+};
 
 const OPERATORS: [&str; 9] = ["and", "or", "not", "any", "all", "sum", "product", "min", "max"];
 

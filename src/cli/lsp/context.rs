@@ -2,7 +2,7 @@
 
 use rfm::syntax::KEYWORDS;
 
-use super::words::{ITEMS, is_of_a_word};
+use crate::cli::language::words::{ITEMS, is_of_a_word};
 
 /// A bracket that is open at the cursor.
 #[derive(Debug, Clone, PartialEq, Eq)]

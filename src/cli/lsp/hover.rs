@@ -10,9 +10,8 @@ use rfm::{Engine, Program};
 use super::across::{Workspace, offered};
 use super::complete::{method_around, signature};
 use super::document::Document;
-use super::keys;
 use super::names::{Imported, Meaning, Mention};
-use super::words::comment_above;
+use crate::cli::language::{keys, words::comment_above};
 
 /// Lines of a definition that are shown.
 const MOST_LINES: usize = 12;

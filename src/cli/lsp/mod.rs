@@ -13,7 +13,6 @@ mod context;
 mod document;
 mod edits;
 mod hover;
-mod keys;
 mod messages;
 mod names;
 mod pipes;
@@ -21,7 +20,6 @@ mod preview;
 mod reading;
 mod slices;
 mod symbols;
-mod words;
 
 use std::collections::HashMap;
 use std::panic::{AssertUnwindSafe, catch_unwind};

@@ -7,6 +7,7 @@
 //! | `idle` | operands whose removal changes nothing: proven by ranges over all of space |
 //! | `uneven` | operands whose gradients differ by a large factor |
 //! | `breaks` | places where ω jumps across its surface, and where it has no value |
+//! | `seams` | places within a solid at which ω is zero |
 //! | `thin` | walls and gaps that are thinner than a length |
 //! | `crossings` | points of the surface, between the nodes of a coarse lattice |
 //!
@@ -16,6 +17,7 @@ mod breaks;
 mod crossings;
 mod idle;
 mod operands;
+mod seams;
 mod thin;
 mod uneven;
 

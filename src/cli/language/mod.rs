@@ -1,0 +1,5 @@
+//! What the words of the language mean, as editors and `rfm explain` tell it.
+
+pub(super) mod keys;
+pub(super) mod page;
+pub(super) mod words;

@@ -1,0 +1,127 @@
+//! `rfm explain WORD` and `rfm explain words`: the words of the language and the keys of scenes, from their declarations.
+
+use std::fmt::Write;
+
+use rfm::lower::vocabulary;
+use rfm::sph::Method;
+
+use super::{
+    keys,
+    words::{self, ITEMS, Signature},
+};
+
+/// What `rfm explain words` prints begins so.
+const HEAD: &str = "# The words of the language, one by one
+
+`rfm explain words` prints this page from the declarations of the words, and `rfm explain WORD` a part of it. Formulas, examples
+and what fields mean are on the [page of words](README.md); the keys that belong to one method are with the
+[methods](../src/sph/methods/README.md).
+";
+
+/// All words and keys as a page of Markdown.
+pub(in crate::cli) fn all() -> String {
+    let mut page = HEAD.to_string();
+    page += "\n## What begins an item\n\n";
+    for (word, about) in ITEMS {
+        page += &entry(word, about);
+    }
+    page += "\n## Functions\n\n";
+    for function in sorted(words::functions()) {
+        page += &entry(&function.label(), &function.about);
+    }
+    page += "\n## Methods of shapes\n\n";
+    for method in sorted(words::methods()) {
+        page += &entry(&format!(".{}", method.label()), &method.about);
+    }
+    for block in keys::blocks() {
+        let title = block.map_or("Keys of a scene".to_string(), |block| format!("Keys of `{block}`"));
+        write!(page, "\n## {title}\n\n").expect("texts take all that is written");
+        for key in vocabulary::keys(block, Method::default()) {
+            page += &entry(key, &keys::about(block, key, Some(Method::default())));
+        }
+    }
+    page
+}
+
+/// What is known of one word: functions, methods and keys of this name, and what begins items. `None` if there are none.
+pub(in crate::cli) fn of(word: &str) -> Option<String> {
+    let word = word.trim_start_matches('.');
+    let mut found = String::new();
+    let is_it = |signature: &Signature| signature.name == word;
+    for (_, about) in ITEMS.iter().filter(|(name, _)| *name == word) {
+        found += &entry(word, about);
+    }
+    for function in words::functions().into_iter().filter(is_it) {
+        found += &entry(&function.label(), &function.about);
+    }
+    for method in words::methods().into_iter().filter(is_it) {
+        found += &entry(&format!("shape.{}", method.label()), &method.about);
+    }
+    for block in keys::blocks() {
+        let methods = Method::all();
+        let mut told: Vec<(String, Vec<&str>)> = Vec::new();
+        for method in methods {
+            if !vocabulary::keys(block, method).contains(&word) {
+                continue;
+            }
+            let about = keys::about(block, word, Some(method));
+            match told.iter_mut().find(|(known, _)| *known == about) {
+                Some((_, methods)) => methods.push(method.name()),
+                None => told.push((about, vec![method.name()])),
+            }
+        }
+        for (about, methods) in told {
+            let block = block.unwrap_or("scene");
+            let with = if methods.len() == Method::all().len() {
+                String::new()
+            } else {
+                format!(", {}", methods.join(", "))
+            };
+            found += &entry(&format!("{word} (key of `{block}`{with})"), &about);
+        }
+    }
+    (!found.is_empty()).then_some(found)
+}
+
+/// Every word that [`of`] knows.
+pub(in crate::cli) fn names() -> Vec<String> {
+    let signatures = words::functions().into_iter().chain(words::methods()).map(|signature| signature.name);
+    let keys = keys::blocks().flat_map(|block| {
+        Method::all().into_iter().flat_map(move |method| vocabulary::keys(block, method)).map(String::from)
+    });
+    let mut names: Vec<String> =
+        ITEMS.iter().map(|(word, _)| (*word).to_string()).chain(signatures).chain(keys).collect();
+    names.sort();
+    names.dedup();
+    names
+}
+
+fn sorted(mut signatures: Vec<Signature>) -> Vec<Signature> {
+    signatures.sort_by(|a, b| (a.name.to_lowercase(), &a.name).cmp(&(b.name.to_lowercase(), &b.name)));
+    signatures.dedup();
+    signatures
+}
+
+/// A word with its meaning, as an item of a list.
+fn entry(word: &str, about: &str) -> String {
+    let about = about.split_whitespace().collect::<Vec<_>>().join(" ");
+    let code = if word.contains('`') { word.to_string() } else { format!("`{word}`") };
+    if about.is_empty() { format!("- {code}\n") } else { format!("- {code}: {about}\n") }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_word_has_an_entry() {
+        for name in names() {
+            let found = of(&name).unwrap_or_else(|| panic!("{name} is not explained"));
+            assert!(found.lines().all(|line| line.len() > name.len() + 6), "{found}");
+        }
+        assert_eq!(of("spheroid"), None);
+        let spacing = of("spacing").unwrap();
+        assert!(spacing.contains("key of `fluid`") && spacing.contains("in m"), "{spacing}");
+        assert!(of(".twist").unwrap().contains("shape.twist(turns)"));
+    }
+}

@@ -1,0 +1,37 @@
+//! Places within a solid at which ω is zero: no particle comes there, and yet there is a surface.
+
+use glam::DVec3;
+
+use crate::solid::Solid;
+
+/// Points on each line on which seams are looked for.
+const POINTS: usize = 32;
+
+/// How far from a seam its sides are, over the size of the solid.
+const BESIDE: f64 = 1e-4;
+
+impl Solid {
+    /// A place at which ω is exactly zero although all around it is inside: where an outline with an edge on the axis is
+    /// turned about it. It is looked for on the axes of the scene and on those of the box around the solid, one of which is
+    /// the axis of a body that was turned.
+    pub fn seam(&self) -> Option<DVec3> {
+        let bounds = self.bounds().aabb()?;
+        let beside = BESIDE * bounds.size().max_element();
+        let on_line = |through: DVec3, axis: usize| {
+            let mut at = through;
+            let across = [DVec3::AXES[(axis + 1) % 3], DVec3::AXES[(axis + 2) % 3]];
+            (0..POINTS).find_map(|k| {
+                let part = (k as f64 + 0.5) / POINTS as f64;
+                at[axis] = bounds.min[axis] + part * bounds.size()[axis];
+                let is_inside = |side: DVec3| self.omega(at + beside * side) > 0.0;
+                let is_seam = self.omega(at) == 0.0
+                    && across.iter().all(|&across| is_inside(across) && is_inside(-across));
+                is_seam.then_some(at)
+            })
+        };
+        let lines = [DVec3::ZERO, 0.5 * (bounds.min + bounds.max)]
+            .into_iter()
+            .flat_map(|through| (0..3).map(move |axis| (through, axis)));
+        lines.into_iter().find_map(|(through, axis)| on_line(through, axis))
+    }
+}
