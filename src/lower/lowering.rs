@@ -119,10 +119,27 @@ impl Lowering<'_> {
 
     /// Reports once for each place; messages about no place in particular all come through.
     pub fn report(&mut self, diagnostic: Diagnostic) {
+        let diagnostic = self.in_users_text(diagnostic);
         let span = diagnostic.primary.span;
         if span.range().is_empty() || self.reported.insert((diagnostic.code.0, span)) {
             self.diagnostics.push(diagnostic);
         }
+    }
+
+    /// A message about a place in the standard solids, put to the call that led there: it is the user who can mend it.
+    fn in_users_text(&self, mut diagnostic: Diagnostic) -> Diagnostic {
+        let within = diagnostic.primary.span;
+        let at = self.user_span(within);
+        if at == within {
+            return diagnostic;
+        }
+        let called = self.scope.calls.iter().rev().find(|call| call.span == at);
+        diagnostic.primary.span = at;
+        diagnostic.primary.text =
+            called.map_or(String::new(), |call| format!("found within `{}`", call.function));
+        diagnostic.secondary.retain(|label| label.span.source.is_users());
+        diagnostic.edit = None;
+        diagnostic
     }
 
     /// Reports and gives the value that silences what depends on it.
