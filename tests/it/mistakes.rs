@@ -79,6 +79,12 @@ const WORDS: &[&str] = &[
     "solid s = sphere { <0, 0, 0>, 1 }",
     "solid s = torus { 1, 0.2 }",
     "use \"parts.rfm\"",
+    "param a = if 1 > 0 then 2 else 3",
+    "solid s = sphere(if 1 > 0 then 2 else 3)",
+    "solid s = polygon(path)",
+    "solid s = path([[0, 0], [1, 0], [0, 1]]).extrude(0, 1)",
+    "solid s = polygon(arc)",
+    "solid s = polygon([[0, 0], spline, [0, 1]])",
 ];
 
 /// Choices, lists, maps of space, profiles and joints.
