@@ -217,7 +217,8 @@ picture shows the section just outside of that face; a plane a little further in
 IDLE_OPERAND = "W0415":
 "It is proven that the solid has the same points without this operand of `and` or `or`: it lies within another member of the
 union, or around all that it is to cut. That is often a slip in a size or a place. Only the shape counts here: the values of ω
-do change. The proof holds for the present values of the params.
+do change. The proof holds for the present values of the params. Of two operands that are the same formula the second one is
+named; where a function or a fold has made them, they are not looked at.
 
     rfm 1
     solid ball = sphere(1) or sphere(0.5)            # the second one lies within the first";

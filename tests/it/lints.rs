@@ -335,3 +335,29 @@ fn a_run_tells_of_what_its_fluid_meets() {
         assert!(!later.contains(code), "{later}");
     }
 }
+
+/// Functions and folds may make equal operands for some arguments and members only.
+#[test]
+fn equal_operands_are_told_of_where_a_person_has_written_them() {
+    let count = |text: &str| {
+        let program =
+            Program::from_source("t.rfm", format!("rfm 1\n{text}")).unwrap_or_else(|e| panic!("{e}"));
+        program.warnings().list.iter().filter(|warning| warning.code.0 == "W0415").count()
+    };
+    for (text, expected) in [
+        ("solid s = sphere(1) or sphere(1)", 1),
+        ("solid s = sphere(1) or ball([0, 0, 0], 1)", 1),
+        ("solid s = sphere(1) or sphere(1) or sphere(1)", 1),
+        ("let a = sphere(1) solid s = box() \\ a \\ a", 1),
+        ("solid s = sphere(1) or sphere(0.5)", 0),
+        ("solid s = sphere(1) or sphere(1).move([1, 0, 0])", 0),
+        ("fn pair(d) = sphere(1) or sphere(1).move([d, 0, 0]) solid s = pair(0) or pair(3)", 0),
+        ("solid s = any k in 0..3: sphere(1).move([k, 0, 0]) or sphere(1).move([k*k, 0, 0])", 0),
+        ("solid s = any k in 0..3: any l in 0..2: sphere(1).move([k*l, 0, 0])", 0),
+        ("solid s = chamfer(sphere(1), sphere(1), 0.1)", 0),
+        ("solid s = polygon([[0, 0], [1, 0], [0, 1]]).loft(polygon([[0, 0], [1, 0], [0, 1]]), 0, 1)", 0),
+        ("solid s = sphere(1).polar_repeat(4)", 0),
+    ] {
+        assert_eq!(count(text), expected, "{text}");
+    }
+}
