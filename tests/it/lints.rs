@@ -5,7 +5,7 @@ use rfm::glam::DVec3;
 use rfm::solid::{Breakage, ThinPart};
 use rfm::{Engine, Program, Solid};
 
-use crate::tool::{rfm, root};
+use crate::tool::{rfm, rfm_reading, root};
 
 fn solid(text: &str) -> Solid {
     let program = Program::from_source("t.rfm", format!("rfm 1\nsolid s = {text}"));
@@ -360,4 +360,15 @@ fn equal_operands_are_told_of_where_a_person_has_written_them() {
     ] {
         assert_eq!(count(text), expected, "{text}");
     }
+}
+
+#[test]
+fn a_volume_that_is_no_number_is_not_called_thin() {
+    let text = b"rfm 1\nsolid s = box([0, 0, 0], [1, 1, 1]) and log10(x) <= 0\n";
+    let said = rfm_reading(root(), &["check", "-"], text).expect(0).stdout;
+    assert!(said.contains("volume      not found: the field is not a number at (-"), "{said}");
+    assert!(!said.contains("thin"), "{said}");
+    let sheet = b"rfm 1\nsolid s = box([0, 0, 0], [1, 1, 1]) and abs(x + y + z - 1.234) <= 1e-5\n";
+    let said = rfm_reading(root(), &["check", "-"], sheet).expect(0).stdout;
+    assert!(said.contains("volume      not found: too thin for 96 cells"), "{said}");
 }
