@@ -87,8 +87,8 @@ OUT_OF_RANGE = "E0209":
 "The value lies outside the range that is allowed for it: a size that must be positive, or a param outside its
 declared `in a .. b`.";
 TOO_LARGE = "E0210":
-"The file unrolls to more operations than the limit (1 million, or what --max-nodes says). A range such as
-`0..1000000` may have too many members.";
+"The file unrolls to more operations than the limit: 1 million, 4 for each byte of a file that is longer than 250 kB, or what
+--max-nodes says. A range such as `0..1000000` may have too many members.";
 OVERRIDE = "E0211":
 "A param is set that the file does not declare with `param name = …`, or to a value outside the range that the declaration
 states, or with another unit. Params are set by `-D name=value`, by files that `-P` names, or by a program.";

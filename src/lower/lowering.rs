@@ -53,6 +53,8 @@ pub(super) struct Lowering<'a> {
     pub has_open_params: bool,
     max_nodes: usize,
     budget_reported: bool,
+    /// Whether a fold with several members was read.
+    pub has_repeated: bool,
     /// Expressions evaluated so far.
     pub evaluations: usize,
     /// Expressions that are being evaluated inside one another.
@@ -111,6 +113,7 @@ impl Lowering<'_> {
             has_open_params: false,
             max_nodes,
             budget_reported: false,
+            has_repeated: false,
             evaluations: 0,
             depth: 0,
             reported: HashSet::new(),
@@ -180,10 +183,11 @@ impl Lowering<'_> {
                 format!("the file evaluates more than {most_evaluations} expressions when it is unrolled")
             };
             let span = self.user_span(span);
-            self.report(
-                Diagnostic::error(Code::TOO_LARGE, span, message)
-                    .help("make a range shorter, or allow more with --max-nodes"),
-            );
+            let help = match self.has_repeated {
+                true => "make a range shorter, or allow more with --max-nodes",
+                false => "split the file, or allow more with --max-nodes",
+            };
+            self.report(Diagnostic::error(Code::TOO_LARGE, span, message).help(help));
         }
         over
     }
