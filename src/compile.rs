@@ -21,7 +21,7 @@ use std::path::Path;
 use std::sync::Arc;
 
 use crate::diagnostic::{Code, Diagnostic, Diagnostics, Label, Severity, Source, SourceId, Span, nearest};
-use crate::geom::Aabb;
+use crate::geom::{Aabb, to_thousandths};
 use crate::ir::Node;
 use crate::lower::{self, Imported};
 use crate::quantity::Dimension;
@@ -376,12 +376,16 @@ impl Program {
             Ok(chosen) => Some(Ok(chosen)),
             Err(best) if best.bound.is_finite() => refused(format!(
                 "the smallest bound of the error in {:.3} … {:.3} is {:.1e}, by {}",
-                over.min,
-                over.max,
+                to_thousandths(over.min),
+                to_thousandths(over.max),
                 best.bound,
                 best.variant.name()
             )),
-            Err(_) => refused(format!("no bound of the error is known in {:.3} … {:.3}", over.min, over.max)),
+            Err(_) => refused(format!(
+                "no bound of the error is known in {:.3} … {:.3}",
+                to_thousandths(over.min),
+                to_thousandths(over.max)
+            )),
         }
     }
 

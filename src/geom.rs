@@ -15,6 +15,17 @@ pub struct Aabb {
     pub max: DVec3,
 }
 
+/// A place to print with three digits behind the point: rounded, and no zero in it has a sign.
+pub fn to_thousandths(p: DVec3) -> DVec3 {
+    DVec3::from_array(p.to_array().map(|x| match x.abs() < LARGEST_WITH_THOUSANDTHS {
+        true => (1e3 * x).round() / 1e3 + 0.0,
+        false => x,
+    }))
+}
+
+/// Larger numbers are printed as they are: there thousandths are near the last digit.
+const LARGEST_WITH_THOUSANDTHS: f64 = 1e12;
+
 impl Aabb {
     /// The empty box. Every union with it gives the other box.
     pub const EMPTY: Self = Self { min: DVec3::INFINITY, max: DVec3::NEG_INFINITY };
@@ -145,6 +156,15 @@ impl Twist {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn printed_zeros_have_no_sign() {
+        let shown = |x, y, z| format!("{:.3}", to_thousandths(DVec3::new(x, y, z)));
+        assert_eq!(shown(-0.0, -0.000_4, 0.000_4), "[0.000, 0.000, 0.000]");
+        assert_eq!(shown(-0.000_6, 1.234_56, -7.0), "[-0.001, 1.235, -7.000]");
+        let large = DVec3::new(1e300, f64::INFINITY, -1e13);
+        assert_eq!(to_thousandths(large), large);
+    }
 
     #[test]
     fn empty_box_is_the_neutral_element_of_union() {

@@ -74,9 +74,9 @@ pub(super) struct Shared {
     /// Let a file import and read files outside of its own folder
     #[arg(long, global = true, hide_short_help = true)]
     pub allow_outside: bool,
-    /// Operations that a file may unroll to
-    #[arg(long, value_name = "N", default_value_t = 1_000_000, global = true, hide_short_help = true)]
-    pub max_nodes: usize,
+    /// Operations that a file may unroll to [default: 1000000, or 4 for each byte of a longer file]
+    #[arg(long, value_name = "N", global = true, hide_short_help = true)]
+    pub max_nodes: Option<usize>,
     /// What evaluates ω: machine code or the interpreter, which gives the same bits
     #[arg(long, value_enum, default_value_t = Engine::Auto, global = true, hide_short_help = true)]
     pub engine: Engine,

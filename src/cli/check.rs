@@ -16,7 +16,7 @@ use rfm::diagnostic::{Code, Diagnostic, Diagnostics};
 use rfm::geom::Aabb;
 use rfm::glam::DVec3;
 use rfm::interval::Interval;
-use rfm::ir::Magnitudes;
+use rfm::ir::{Axis, Magnitudes};
 use rfm::lower::NamedSolid;
 use rfm::mesh::{self, Grid, Resolution, ThinCells, VolumeError};
 use rfm::solid::{Bounds, ProgramKind, Unbounded};
@@ -74,9 +74,9 @@ struct Facts {
     /// The number of components that half as many cells show.
     #[serde(skip)]
     components_coarser: Option<usize>,
-    /// Whether it was tried to find all this.
+    /// Why there is no volume although there are bounds.
     #[serde(skip)]
-    is_measured: bool,
+    no_volume: Option<String>,
 }
 
 impl Facts {
@@ -98,7 +98,7 @@ impl Facts {
             time: solid.moves().then(|| solid.time()),
             thin_cells: None,
             components_coarser: None,
-            is_measured: true,
+            no_volume: None,
         }
     }
 }
@@ -285,7 +285,7 @@ fn solids(
             let bounds = solid.bounds().aabb().map(|bounds| Box3::of(&bounds));
             let empty = *solid.bounds() == Bounds::Empty;
             let unknown = Facts::unknown(&solid, file);
-            facts.push(Facts { tolerance, bounds, empty, is_measured: false, ..unknown });
+            facts.push(Facts { tolerance, bounds, empty, ..unknown });
             continue;
         }
         let (mut found, thin) = measure(&solid, file)?;
@@ -299,7 +299,7 @@ fn solids(
             Some(Err(diagnostic)) => diagnostics.list.push(*diagnostic),
             None => {}
         }
-        diagnostics.list.extend(remarks(named, &solid, &thin));
+        diagnostics.list.extend(remarks(program, named, &solid, &thin));
         diagnostics.list.extend(lints::of_solid(program, named, &solid, &mut searches));
         facts.push(found);
     }
@@ -327,7 +327,7 @@ fn too_long(solid: &Solid, operations: usize, budget: f64) -> Option<String> {
 }
 
 /// Warnings about a solid that is empty, unbounded or thin.
-fn remarks(named: &NamedSolid, solid: &Solid, thin: &ThinCells) -> Vec<Diagnostic> {
+fn remarks(program: &Program, named: &NamedSolid, solid: &Solid, thin: &ThinCells) -> Vec<Diagnostic> {
     let warning = |code, message| Diagnostic::warning(code, named.span, message);
     let mut found = Vec::new();
     match solid.bounds() {
@@ -336,7 +336,7 @@ fn remarks(named: &NamedSolid, solid: &Solid, thin: &ThinCells) -> Vec<Diagnosti
             found.push(warning(Code::EMPTY_SOLID, message));
         }
         Bounds::Unbounded => {
-            found.push(unbounded(named, solid));
+            found.push(unbounded(program, named, solid));
         }
         Bounds::Within(_) => {}
     }
@@ -363,11 +363,17 @@ fn remarks(named: &NamedSolid, solid: &Solid, thin: &ThinCells) -> Vec<Diagnosti
 }
 
 /// A warning that says which operand of a solid was not found to end, and where.
-fn unbounded(named: &NamedSolid, solid: &Solid) -> Diagnostic {
+fn unbounded(program: &Program, named: &NamedSolid, solid: &Solid) -> Diagnostic {
     let why = solid.unbounded();
     let sides = why.as_ref().map_or(String::new(), Unbounded::direction);
     let message = format!("solid `{}` could not be proven to end {sides}", named.name);
-    let help = "intersect it with a box, or mesh it with --box";
+    let ends_but_along_z = why.as_ref().is_some_and(|why| why.sides == ["-z", "+z"]);
+    let help = match ends_but_along_z && !program.module().graph.uses(named.node, Axis::Z) {
+        true => {
+            "it is a profile, the same at every z: `.extrude(z0, z1)` or `.revolve()` makes a solid of it"
+        }
+        false => "intersect it with a box, or mesh it with --box",
+    };
     let warning = Diagnostic::warning(Code::UNBOUNDED_SOLID, named.span, message).help(help);
     let operand = why.filter(|why| !why.is_whole).and_then(|why| why.operand);
     match operand.filter(|operand| operand.source == named.span.source) {
@@ -437,11 +443,15 @@ fn measure(solid: &Solid, file: &str) -> Result<(Facts, ThinCells), Failure> {
             let no_thin_parts = thin.as_ref().is_some_and(|thin| thin.count == 0 || thin.is_wedge);
             facts.resolved = Some(found.solids == found.solids_coarser && no_thin_parts);
         }
-        Err(VolumeError::TooThin) => {}
+        Err(VolumeError::TooThin) => {
+            facts.no_volume = Some(format!("too thin for {VOLUME_CELLS} cells along its longest side"));
+        }
         Err(error @ VolumeError::TooFewCells(_)) => return Err(Failure::usage(error)),
         Err(VolumeError::Grid(error)) => return Err(Failure::usage(error)),
-        // a field that is not a number somewhere has no volume
-        Err(VolumeError::Mesh(_)) => return Ok((facts, ThinCells::NONE)),
+        Err(VolumeError::Mesh(error)) => {
+            facts.no_volume = Some(error.to_string());
+            return Ok((facts, ThinCells::NONE));
+        }
     }
     facts.thin_cells = thin.as_ref().map(|thin| thin.count);
     Ok((facts, thin.unwrap_or(ThinCells::NONE)))
@@ -500,8 +510,8 @@ fn print_solid(solid: &Facts) {
     if let Some(bounds) = &solid.bounds {
         let [min, max] = corners(bounds);
         say!("    bounds      {min} … {max}");
-        if solid.volume.is_none() && solid.is_measured {
-            say!("    volume      not found: too thin for {} cells along its longest side", VOLUME_CELLS);
+        if let Some(why) = &solid.no_volume {
+            say!("    volume      not found: {why}");
         }
     } else if !solid.empty {
         say!("    bounds      none found");

@@ -10,7 +10,7 @@ use super::run::{experiment, start};
 use super::{Failure, choose, input};
 use rfm::codegen::{CodegenError, Listing, Request, Shape, target_description};
 use rfm::diagnostic::{Span, explain, explanations, nearest};
-use rfm::geom::Aabb;
+use rfm::geom::{Aabb, to_thousandths};
 use rfm::interval::Interval;
 use rfm::ir::{Node, dump};
 use rfm::lower::{NamedSolid, Scene};
@@ -128,8 +128,8 @@ fn stages(shared: &Shared, program: &Program, named: &NamedSolid, show: &[Stage]
             "  values of ω: {}, to {:.1e} in {:.3} … {:.3}",
             chosen.variant().name(),
             chosen.bound(),
-            over.min,
-            over.max
+            to_thousandths(over.min),
+            to_thousandths(over.max)
         );
     }
     say!("  target: {}", target_description());
@@ -280,9 +280,7 @@ impl Explanation<'_> {
             Bounds::Empty => return say!("  bounds: empty, proven by ranges"),
             Bounds::Unbounded => return say!("  bounds: none found"),
         };
-        // + 0 turns −0 into 0
-        let number = |x: f64| format!("{:.3}", (1e3 * x).round() / 1e3 + 0.0);
-        let corner = |p: DVec3| format!("[{}, {}, {}]", number(p.x), number(p.y), number(p.z));
+        let corner = |p: DVec3| format!("{:.3}", to_thousandths(p));
         let shown = (corner(bounds.min), corner(bounds.max));
         say!("  what ranges leave of it in its bounds {} to {}, {}:", shown.0, shown.1, Exactness::ZeroSet);
         self.say_left(vec![("everywhere".to_string(), bounds)]);

@@ -3,7 +3,7 @@
 
 use super::failure::note;
 use rfm::diagnostic::{Code, Diagnostic, Diagnostics, Span};
-use rfm::geom::Aabb;
+use rfm::geom::{Aabb, to_thousandths};
 use rfm::glam::DVec3;
 use rfm::ir::Node;
 use rfm::lower::{Measured, NamedSolid, Obstacle, Scene};
@@ -354,5 +354,6 @@ fn wall_limit(scene: &Scene, number: usize) -> f64 {
 }
 
 fn point(p: DVec3) -> String {
-    format!("[{:.3}, {:.3}, {:.3}]", p.x + 0.0, p.y + 0.0, p.z + 0.0)
+    let DVec3 { x, y, z } = to_thousandths(p);
+    format!("[{x:.3}, {y:.3}, {z:.3}]")
 }

@@ -87,8 +87,8 @@ OUT_OF_RANGE = "E0209":
 "The value lies outside the range that is allowed for it: a size that must be positive, or a param outside its
 declared `in a .. b`.";
 TOO_LARGE = "E0210":
-"The file unrolls to more operations than the limit (1 million, or what --max-nodes says). A range such as
-`0..1000000` may have too many members.";
+"The file unrolls to more operations than the limit: 1 million, 4 for each byte of a file that is longer than 250 kB, or what
+--max-nodes says. A range such as `0..1000000` may have too many members.";
 OVERRIDE = "E0211":
 "A param is set that the file does not declare with `param name = …`, or to a value outside the range that the declaration
 states, or with another unit. Params are set by `-D name=value`, by files that `-P` names, or by a program.";
@@ -217,7 +217,8 @@ picture shows the section just outside of that face; a plane a little further in
 IDLE_OPERAND = "W0415":
 "It is proven that the solid has the same points without this operand of `and` or `or`: it lies within another member of the
 union, or around all that it is to cut. That is often a slip in a size or a place. Only the shape counts here: the values of ω
-do change. The proof holds for the present values of the params.
+do change. The proof holds for the present values of the params. Of two operands that are the same formula the second one is
+named; where a function or a fold has made them, they are not looked at.
 
     rfm 1
     solid ball = sphere(1) or sphere(0.5)            # the second one lies within the first";

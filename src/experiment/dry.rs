@@ -203,7 +203,9 @@ impl<'a> Near<'a> {
 /// A place with digits that tell tenths of the spacing apart.
 fn place(at: DVec3, spacing: f64) -> String {
     let digits = (1.0 - spacing.log10()).ceil().clamp(0.0, 9.0) as usize;
-    let [x, y, z] = at.to_array().map(|x| format!("{:.digits$}", x));
+    let unit = 10_f64.powi(digits as i32);
+    // rounded first, so that zero has no sign
+    let [x, y, z] = at.to_array().map(|x| format!("{:.digits$}", (unit * x).round() / unit + 0.0));
     format!("[{x}, {y}, {z}]")
 }
 

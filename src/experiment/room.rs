@@ -7,7 +7,7 @@ use crate::Solid;
 use crate::compile::Error;
 use crate::diagnostic::{Code, Diagnostic, Span};
 use crate::field::Field;
-use crate::geom::Aabb;
+use crate::geom::{Aabb, to_thousandths};
 use crate::lower::Scene;
 use crate::solid::Bounds;
 use crate::sph::{MAX_SITES, SeedError};
@@ -93,7 +93,8 @@ impl Experiment {
         let within = bounds.intersection(&domain);
         if within.is_empty() || within.size().min_element() <= 0.0 {
             let message = "the shape of the fluid lies outside the box".to_string();
-            let reach = format!("it lies between {} and {}", place(bounds.min), place(bounds.max));
+            let reach =
+                format!("it lies between {} and {}", to_thousandths(bounds.min), to_thousandths(bounds.max));
             return Err(refuse(&self.program, no_room(message).at(reach)));
         }
         Ok(bounds)
@@ -227,7 +228,8 @@ impl Experiment {
                 "about {:.0} % of the fluid's shape lies outside the box, and is left out",
                 100.0 * part
             );
-            let at = format!("it lies between {} and {}", place(bounds.min), place(bounds.max));
+            let at =
+                format!("it lies between {} and {}", to_thousandths(bounds.min), to_thousandths(bounds.max));
             Diagnostic::warning(Code::FLUID_OUTSIDE_BOX, self.scene.fluid.shape_span, message)
                 .at(at)
                 .label(self.scene.domain_span, format!("the box goes from {} to {}", domain.min, domain.max))
@@ -327,11 +329,6 @@ fn samples(region: &Aabb) -> impl Iterator<Item = DVec3> + use<> {
         let (i, j, k) = (index % nx, index / nx % ny, index / (nx * ny));
         min + cell * (DVec3::new(i as f64, j as f64, k as f64) + 0.5)
     })
-}
-
-/// A place with three digits behind the point, and no sign before zero.
-fn place(at: DVec3) -> DVec3 {
-    (1e3 * at).round() / 1e3 + 0.0
 }
 
 /// A length as a file writes it, with three digits: `2.5 mm`, `0.12 m`.

@@ -364,6 +364,7 @@ impl Lowering<'_> {
     fn logic(&mut self, op: Logic, operands: &[Expr], span: Span) -> Value {
         let nodes: Vec<Option<Node>> = operands.iter().map(|operand| self.field(operand)).collect();
         let Some(mut nodes) = nodes.into_iter().collect::<Option<Vec<Node>>>() else { return Value::Failed };
+        self.warn_of_twins(op, operands, &nodes);
         if op == Logic::Minus {
             for node in &mut nodes[1..] {
                 *node = self.unary(Unary::Neg, *node, span);

@@ -85,9 +85,14 @@ pub(super) fn value(name: &str) -> Option<&'static str> {
         }
         "p" | "P" | "pos" | "position" | "uv" => "write `[x, y, z]`",
         "if" | "then" | "else" => foreign::CONDITION,
+        "path" | "polyline" | "bezier" | "curve" | "contour" | "outline" => CURVES,
         _ => return None,
     })
 }
+
+/// The words for outlines and paths.
+const CURVES: &str = "outlines and paths are lists of points, among them those of `arc`, `spline`, `helix` and `rounded`: \
+                      write `polygon([arc([0, 0], 1, 0°, 180°), [0, -1]])`, or `sweep([[0, 0, 0], [1, 0, 0], [1, 1, 0]], 0.1)`";
 
 /// What a word is called here, and how its call is written.
 struct Words {
@@ -239,6 +244,9 @@ fn solid(name: &str, a: &[&str]) -> Option<Words> {
             "`mesh(…)` here, and `import` for a file of this language",
             "write `mesh(\"part.stl\")`, or `import \"chess.rfm\" as chess` in front of the solids",
         ),
+        "path" | "polyline" | "bezier" | "curve" | "contour" | "outline" => {
+            words("`polygon` or `sweep` here", CURVES)
+        }
         "surface" | "heightfield" | "height_field" | "heightmap" => {
             written("`height_map(…)` here", "height_map(\"terrain.csv\", [0, 0], [100, 80])")
         }

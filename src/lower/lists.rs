@@ -102,6 +102,7 @@ impl Lowering<'_> {
         if !self.may_be_local(variable) {
             return Value::Failed;
         }
+        self.has_repeated |= values.len() > 1;
         let is_range = matches!(members, Members::Range(..));
         let mut results = Vec::new();
         for value in values.iter().cloned() {
@@ -132,10 +133,7 @@ impl Lowering<'_> {
         }
         if start >= end && !matches!(op, Fold::Sum | Fold::Product) {
             let message = format!("`{}` over the range {start} .. {end}, which has no member", op.word());
-            self.report(
-                Diagnostic::error(Code::OUT_OF_RANGE, whole, message)
-                    .help("a range a..b holds a, a+1, … b−1; a must be less than b"),
-            );
+            self.report(Diagnostic::error(Code::OUT_OF_RANGE, whole, message).help(self.more_members(op)));
             return None;
         }
         if end - start > LONGEST_FOLD {
@@ -157,6 +155,20 @@ impl Lowering<'_> {
             index += 1.0;
         }
         Some(numbers.into())
+    }
+
+    /// What to write for a fold without members: it has no value, as a sum has.
+    fn more_members(&self, op: Fold) -> String {
+        let why = match op {
+            Fold::Any | Fold::All => "no shape would be left, and there is no formula for none",
+            Fold::Min | Fold::Max => "no number is the least or greatest of none",
+            Fold::Sum | Fold::Product => "a sum over none is 0 and a product 1",
+        };
+        // `any i in 0..n: any j in 0..i: …`
+        match self.scope.locals.last().filter(|local| local.bare && self.scope.calls.is_empty()) {
+            Some(outer) => format!("{why}: begin the range of `{}` where this one has a member", outer.name),
+            None => format!("{why}: a range a..b holds a, a+1, … b−1, so a must be less than b"),
+        }
     }
 
     /// The members of the list that a fold goes through.

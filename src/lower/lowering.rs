@@ -53,6 +53,8 @@ pub(super) struct Lowering<'a> {
     pub has_open_params: bool,
     max_nodes: usize,
     budget_reported: bool,
+    /// Whether a fold with several members was read.
+    pub has_repeated: bool,
     /// Expressions evaluated so far.
     pub evaluations: usize,
     /// Expressions that are being evaluated inside one another.
@@ -111,6 +113,7 @@ impl Lowering<'_> {
             has_open_params: false,
             max_nodes,
             budget_reported: false,
+            has_repeated: false,
             evaluations: 0,
             depth: 0,
             reported: HashSet::new(),
@@ -119,10 +122,27 @@ impl Lowering<'_> {
 
     /// Reports once for each place; messages about no place in particular all come through.
     pub fn report(&mut self, diagnostic: Diagnostic) {
+        let diagnostic = self.in_users_text(diagnostic);
         let span = diagnostic.primary.span;
         if span.range().is_empty() || self.reported.insert((diagnostic.code.0, span)) {
             self.diagnostics.push(diagnostic);
         }
+    }
+
+    /// A message about a place in the standard solids, put to the call that led there: it is the user who can mend it.
+    fn in_users_text(&self, mut diagnostic: Diagnostic) -> Diagnostic {
+        let within = diagnostic.primary.span;
+        let at = self.user_span(within);
+        if at == within {
+            return diagnostic;
+        }
+        let called = self.scope.calls.iter().rev().find(|call| call.span == at);
+        diagnostic.primary.span = at;
+        diagnostic.primary.text =
+            called.map_or(String::new(), |call| format!("found within `{}`", call.function));
+        diagnostic.secondary.retain(|label| label.span.source.is_users());
+        diagnostic.edit = None;
+        diagnostic
     }
 
     /// Reports and gives the value that silences what depends on it.
@@ -163,10 +183,11 @@ impl Lowering<'_> {
                 format!("the file evaluates more than {most_evaluations} expressions when it is unrolled")
             };
             let span = self.user_span(span);
-            self.report(
-                Diagnostic::error(Code::TOO_LARGE, span, message)
-                    .help("make a range shorter, or allow more with --max-nodes"),
-            );
+            let help = match self.has_repeated {
+                true => "make a range shorter, or allow more with --max-nodes",
+                false => "split the file, or allow more with --max-nodes",
+            };
+            self.report(Diagnostic::error(Code::TOO_LARGE, span, message).help(help));
         }
         over
     }

@@ -57,14 +57,15 @@ use names::{Kind, RESERVED, TIME};
 use value::Value;
 
 /// Limits and overrides of a lowering.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Default)]
 pub struct Options {
     /// Values for params in SI units, as `-D name=value` gives them.
     pub overrides: BTreeMap<String, f64>,
     /// Dimensions of those overrides that were given with a unit.
     pub dimensions: BTreeMap<String, Dimension>,
-    /// Most operations to which a file may unroll.
-    pub max_nodes: usize,
+    /// Most operations to which a file may unroll. `None` for [`MAX_NODES`], or [`NODES_PER_BYTE`] for each byte of the file
+    /// and of those that it imports if that is more.
+    pub max_nodes: Option<usize>,
     /// The method of every scene, in place of the one that it states. Defaults that depend on the method
     /// follow it.
     pub method: Option<Method>,
@@ -82,18 +83,12 @@ pub struct OpenParams {
     pub fixed: BTreeSet<String>,
 }
 
-impl Default for Options {
-    fn default() -> Self {
-        Self {
-            overrides: BTreeMap::new(),
-            dimensions: BTreeMap::new(),
-            max_nodes: 1_000_000,
-            method: None,
-            open: None,
-            files: Files::default(),
-        }
-    }
-}
+/// Most operations to which a short file may unroll by default.
+pub const MAX_NODES: usize = 1_000_000;
+
+/// Operations for each byte of a long file by default. Lines of standard solids that are turned and moved make one for two
+/// bytes, calls of functions more, and only ranges very many.
+pub const NODES_PER_BYTE: usize = 4;
 
 /// The source of the standard solids.
 pub fn prelude_source() -> Source {
@@ -142,7 +137,9 @@ fn lower_here(
     imported: &[Imported],
     options: &Options,
 ) -> (Module, Vec<Diagnostic>) {
-    let mut lowering = Lowering::new(ast.text.clone(), options.max_nodes);
+    let bytes = ast.text.len() + imported.iter().map(|file| file.source.text.len()).sum::<usize>();
+    let max_nodes = options.max_nodes.unwrap_or_else(|| MAX_NODES.max(NODES_PER_BYTE * bytes));
+    let mut lowering = Lowering::new(ast.text.clone(), max_nodes);
     lowering.method = options.method;
     lowering.has_open_params = options.open.is_some();
     for item in &prelude().items {

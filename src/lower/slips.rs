@@ -1,12 +1,14 @@
 //! What is accepted by the rules of the language and still is rarely meant: degrees written as radians, ω subtracted
 //! from ω, solids without a surface. The messages ask.
 
+use rustc_hash::FxHashMap;
+
 use super::lowering::Lowering;
 use super::names::{Kind, TIME};
 use crate::diagnostic::{Code, Diagnostic, SourceId};
 use crate::ir::{Binary, Node};
 use crate::quantity::{Dimension, parse_unit};
-use crate::syntax::ast::{Expr, ExprKind, Fold};
+use crate::syntax::ast::{Expr, ExprKind, Fold, Logic};
 use crate::syntax::foreign;
 
 impl Lowering<'_> {
@@ -51,6 +53,35 @@ impl Lowering<'_> {
             _ => "write a standard solid such as `sphere(1)`, or an inequality such as `z <= 1`".to_string(),
         };
         self.report(warning.help(help));
+    }
+
+    /// Warns of the first operand that is the same formula as one before it. Within functions and folds this may hold for
+    /// some arguments and members only, so only what is written outside of them is looked at.
+    pub fn warn_of_twins(&mut self, op: Logic, operands: &[Expr], nodes: &[Node]) {
+        if !self.scope.calls.is_empty() || !self.scope.locals.is_empty() {
+            return;
+        }
+        let mut first_of: FxHashMap<Node, usize> = FxHashMap::default();
+        let (mut first_twins, mut count) = (None, 0);
+        // a \ a is nothing at all, which is told otherwise
+        for (later, node) in nodes.iter().enumerate().skip(usize::from(op == Logic::Minus)) {
+            let earlier = *first_of.entry(*node).or_insert(later);
+            if earlier != later {
+                first_twins.get_or_insert((earlier, later));
+                count += 1;
+            }
+        }
+        let Some((earlier, later)) = first_twins else { return };
+        let message = match count {
+            1 => format!("two operands of `{}` are the same", op.word()),
+            _ => format!("{count} operands of `{}` are the same as others before them", op.word()),
+        };
+        self.report(
+            Diagnostic::warning(Code::IDLE_OPERAND, operands[later].span, message)
+                .at("it changes no point of the shape")
+                .label(operands[earlier].span, "it is the same as this")
+                .help("remove one of them, or look for a slip in its size or place"),
+        );
     }
 
     /// Warns of a division by a constant zero.

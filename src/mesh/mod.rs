@@ -153,7 +153,7 @@ impl fmt::Display for MeshError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::NotANumber { at } => {
-                write!(f, "the field is not a number at ({}, {}, {})", at.x, at.y, at.z)
+                write!(f, "the field is not a number at ({}, {}, {})", at.x + 0.0, at.y + 0.0, at.z + 0.0)
             }
             Self::TooManyVertices { found } => {
                 let most = Mesh::MAX_VERTICES;

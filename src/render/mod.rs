@@ -50,7 +50,7 @@ pub use self::{
     mesh::MeshView,
     overlay::{Caption, Legend, Scale},
     particles::ParticlesView,
-    shade::Material,
+    shade::{Material, OBSTACLE},
 };
 use crate::geom::Aabb;
 

@@ -38,8 +38,9 @@ const GLEAM: [f32; 3] = [-0.254_519, 0.381_778, 0.888_519];
 const AMBIENT: f32 = 0.52;
 const DIFFUSE: f32 = 0.58;
 
-/// The obstacle's colour: a neutral warm grey.
-const STONE: [f32; 3] = [203.0, 195.0, 184.0];
+/// The colour of all obstacles: a neutral warm grey.
+pub const OBSTACLE: Rgb = [203, 195, 184];
+const STONE: [f32; 3] = [OBSTACLE[0] as f32, OBSTACLE[1] as f32, OBSTACLE[2] as f32];
 
 /// The colour of faces that a cut has opened: that of brick.
 const SECTION: [f32; 3] = [214.0, 170.0, 146.0];

@@ -195,6 +195,17 @@ pub enum Logic {
     Minus,
 }
 
+impl Logic {
+    /// As it is written.
+    pub fn word(self) -> &'static str {
+        match self {
+            Self::And => "and",
+            Self::Or => "or",
+            Self::Minus => "\\",
+        }
+    }
+}
+
 /// What a fold makes of its members.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Fold {

@@ -27,6 +27,9 @@ impl<'t> Slip<'t> {
         if let Some(diagnostic) = self.import() {
             return Some(diagnostic);
         }
+        if matches!(last_word(self.on_its_line().trim_end()), "if" | "when" | "case") {
+            return Some(self.syntax("a formula has no `if`").help(foreign::CONDITION));
+        }
         if self.found.chars().next().is_some_and(|c| c.is_alphabetic() || c == '_') {
             return self.word();
         }
@@ -81,9 +84,6 @@ impl<'t> Slip<'t> {
             return Some(
                 self.unexpected().at("`for` is written `any` here").help("write `any i in 0..6: …`"),
             );
-        }
-        if matches!(last_word(line), "if" | "when" | "case") {
-            return Some(self.syntax("a formula has no `if`").help(foreign::CONDITION));
         }
         if called && line.ends_with(')') {
             return self.transform_in_front();

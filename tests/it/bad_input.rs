@@ -209,7 +209,7 @@ const TOKENS: &[&str] = &[
 /// Goes the whole way to a compiled solid. Only the absence of a panic is asserted.
 fn compile(text: &str) {
     let source = rfm::diagnostic::Source::file("soup.rfm", text);
-    let options = rfm::lower::Options { max_nodes: 2_000, ..Default::default() };
+    let options = rfm::lower::Options { max_nodes: Some(2_000), ..Default::default() };
     match Program::check(source, options) {
         Ok(program) => {
             for named in &program.module().solids {
@@ -259,4 +259,31 @@ proptest! {
         }
         compile(&text.into_iter().collect::<String>());
     }
+}
+
+/// A file may unroll to more operations if it is longer, and the message says what there is to shorten.
+#[test]
+fn the_limit_of_operations_grows_with_the_file() {
+    let lines = |count: usize| {
+        let line = |i| {
+            format!(
+                "solid s{i} = box([0,0,0],[1.{i},1.{i}9,2]).rotate_z(0.{i}).move([0.{i}1,0.{i}2,0]) \\ cylinder(0.2{i},2.{i})\n"
+            )
+        };
+        let mut text = String::from("rfm 1\n");
+        text.extend((1..=count).map(line));
+        text
+    };
+    let checked = |text: String, max_nodes| {
+        let options = rfm::lower::Options { max_nodes, ..Default::default() };
+        Program::check(rfm::diagnostic::Source::file("many.rfm", text), options)
+    };
+    let many = checked(lines(20_000), None).unwrap_or_else(|e| panic!("{e}"));
+    assert!(many.module().graph.len() > rfm::lower::MAX_NODES, "{}", many.module().graph.len());
+    let refused = checked(lines(100), Some(1_000)).unwrap_err().to_string();
+    assert!(refused.contains("split the file, or allow more with --max-nodes"), "{refused}");
+    let range = "rfm 1\nsolid s = any i in 0..100000: sphere(1).move([i, i^2, 0]).rotate_z(i)\n".to_string();
+    let refused = checked(range, None).unwrap_err().to_string();
+    assert!(refused.contains("more than 1000000 operations"), "{refused}");
+    assert!(refused.contains("make a range shorter"), "{refused}");
 }

@@ -5,7 +5,7 @@ use rfm::glam::DVec3;
 use rfm::solid::{Breakage, ThinPart};
 use rfm::{Engine, Program, Solid};
 
-use crate::tool::{rfm, root};
+use crate::tool::{rfm, rfm_reading, root};
 
 fn solid(text: &str) -> Solid {
     let program = Program::from_source("t.rfm", format!("rfm 1\nsolid s = {text}"));
@@ -356,4 +356,41 @@ fn seams_of_turned_outlines_are_found() {
     ] {
         assert_eq!(solid(sound).seam(), None, "{sound}");
     }
+}
+
+/// Functions and folds may make equal operands for some arguments and members only.
+#[test]
+fn equal_operands_are_told_of_where_a_person_has_written_them() {
+    let count = |text: &str| {
+        let program =
+            Program::from_source("t.rfm", format!("rfm 1\n{text}")).unwrap_or_else(|e| panic!("{e}"));
+        program.warnings().list.iter().filter(|warning| warning.code.0 == "W0415").count()
+    };
+    for (text, expected) in [
+        ("solid s = sphere(1) or sphere(1)", 1),
+        ("solid s = sphere(1) or ball([0, 0, 0], 1)", 1),
+        ("solid s = sphere(1) or sphere(1) or sphere(1)", 1),
+        ("let a = sphere(1) solid s = box() \\ a \\ a", 1),
+        ("solid s = sphere(1) or sphere(0.5)", 0),
+        ("solid s = sphere(1) or sphere(1).move([1, 0, 0])", 0),
+        ("fn pair(d) = sphere(1) or sphere(1).move([d, 0, 0]) solid s = pair(0) or pair(3)", 0),
+        ("solid s = any k in 0..3: sphere(1).move([k, 0, 0]) or sphere(1).move([k*k, 0, 0])", 0),
+        ("solid s = any k in 0..3: any l in 0..2: sphere(1).move([k*l, 0, 0])", 0),
+        ("solid s = chamfer(sphere(1), sphere(1), 0.1)", 0),
+        ("solid s = polygon([[0, 0], [1, 0], [0, 1]]).loft(polygon([[0, 0], [1, 0], [0, 1]]), 0, 1)", 0),
+        ("solid s = sphere(1).polar_repeat(4)", 0),
+    ] {
+        assert_eq!(count(text), expected, "{text}");
+    }
+}
+
+#[test]
+fn a_volume_that_is_no_number_is_not_called_thin() {
+    let text = b"rfm 1\nsolid s = box([0, 0, 0], [1, 1, 1]) and log10(x) <= 0\n";
+    let said = rfm_reading(root(), &["check", "-"], text).expect(0).stdout;
+    assert!(said.contains("volume      not found: the field is not a number at (-"), "{said}");
+    assert!(!said.contains("thin"), "{said}");
+    let sheet = b"rfm 1\nsolid s = box([0, 0, 0], [1, 1, 1]) and abs(x + y + z - 1.234) <= 1e-5\n";
+    let said = rfm_reading(root(), &["check", "-"], sheet).expect(0).stdout;
+    assert!(said.contains("volume      not found: too thin for 96 cells"), "{said}");
 }

@@ -41,6 +41,7 @@ impl Editor {
         assert_eq!(answer["serverInfo"]["name"], "rfm");
         let expected = if encodings.contains(&"utf-8") { "utf-8" } else { "utf-16" };
         assert_eq!(answer["capabilities"]["positionEncoding"], expected);
+        assert_eq!(answer["capabilities"]["colorProvider"], true);
         editor.tell("initialized", json!({}));
         editor
     }
@@ -553,4 +554,25 @@ fn a_senseless_message_is_refused_and_survived() {
     let at = json!({ "textDocument": { "uri": URI }, "position": { "line": 1, "character": 10 } });
     let hover = editor.ask("textDocument/hover", at);
     assert!(hover["contents"].to_string().contains("sphere"), "{hover}");
+}
+
+#[test]
+fn solids_have_the_colour_of_pictures() {
+    let mut editor =
+        Editor::with("rfm 1\nlet a = 1\n# 𝄞\nsolid pair = sphere(a)\nsolid post = cylinder(a, 2)\n");
+    let colours = editor.about("documentColor");
+    let range = |line: u32, from: u32, to: u32| json!({ "start": { "line": line, "character": from }, "end": { "line": line, "character": to } });
+    let ranges: Vec<&Value> = colours.as_array().unwrap().iter().map(|found| &found["range"]).collect();
+    assert_eq!(ranges, [&range(3, 6, 10), &range(4, 6, 10)]);
+    for (channel, expected) in ["red", "green", "blue"].into_iter().zip(rfm::render::OBSTACLE) {
+        let found = colours[1]["color"][channel].as_f64().unwrap();
+        assert!((255.0 * found - f64::from(expected)).abs() < 0.01, "{channel} {found}");
+    }
+    // a file cannot say another colour
+    let asked =
+        json!({ "textDocument": { "uri": URI }, "color": colours[0]["color"], "range": range(3, 6, 10) });
+    assert_eq!(editor.ask("textDocument/colorPresentation", asked), json!([]));
+    editor.open("rfm 1\nsolid s = \n");
+    editor.about("documentColor");
+    editor.end();
 }

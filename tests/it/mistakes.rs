@@ -79,6 +79,12 @@ const WORDS: &[&str] = &[
     "solid s = sphere { <0, 0, 0>, 1 }",
     "solid s = torus { 1, 0.2 }",
     "use \"parts.rfm\"",
+    "param a = if 1 > 0 then 2 else 3",
+    "solid s = sphere(if 1 > 0 then 2 else 3)",
+    "solid s = polygon(path)",
+    "solid s = path([[0, 0], [1, 0], [0, 1]]).extrude(0, 1)",
+    "solid s = polygon(arc)",
+    "solid s = polygon([[0, 0], spline, [0, 1]])",
 ];
 
 /// Choices, lists, maps of space, profiles and joints.
@@ -106,6 +112,14 @@ const SHAPES: &[&str] = &[
     "solid s = polygon([[0, 0], [x, 0], [0, 1]])",
     "solid s = box().repeat([1, 1, 1], [0, 1, 1])",
     "solid s = box().repeat([0, 1, 1], [2, 1, 1])",
+    "param n = 0 in 0 .. 9\nsolid s = sphere(1).polar_repeat(n)",
+    "solid s = sphere(1).polar_repeat(2.5)",
+    "fn ring(n) = sphere(1).polar_repeat(n)\nsolid s = ring(1)",
+    "solid s = any i in 0..3: any j in 0..i: ball([i, j, 0], 1)",
+    "solid s = sphere(1) or box() or sphere(1)",
+    "solid s = sphere(1) or box() or sphere(1) or box()",
+    "let a = sphere(1)\nsolid s = a and a",
+    "solid s = box() \\ sphere(1) \\ ball([0, 0, 0], 1)",
     "solid s = box().repeat(2)",
     "solid s = box().at([x, y])",
     "solid s = box().at(2*x)",

@@ -533,3 +533,21 @@ fn explain_lists_the_passes_of_each_method() {
     }
     snapshot("cli", "explain passes", &text);
 }
+
+#[test]
+fn a_file_that_a_scene_reads_is_named_if_a_run_cannot_go_on() {
+    let folder = tempfile::tempdir().unwrap();
+    let here = folder.path();
+    let outline = "let outline = points(\"outline.csv\")\nsolid post = polygon(outline).extrude(0, 0.3)";
+    let text = scene("wcsph", "until: 20 ms, save_every: 10 ms")
+        .replace("solid post = cylinder(r, 0.3).move([0.5, 0.5, 0])", outline);
+    std::fs::write(here.join("drop.rfm"), text).unwrap();
+    std::fs::write(here.join("outline.csv"), "0.4,0.4\n0.6,0.4\n0.5,0.6\n").unwrap();
+    run(here, &["out", "--steps", "5"]).expect(0);
+    std::fs::write(here.join("outline.csv"), "0.4,0.4\n0.6,0.4\n0.5,0.61\n").unwrap();
+    let refused = run(here, &["out", "--resume"]).expect(2).stderr;
+    assert!(
+        refused.contains("or this one or a file that it reads (`outline.csv`) was changed since"),
+        "{refused}"
+    );
+}

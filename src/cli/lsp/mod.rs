@@ -8,6 +8,7 @@
 mod across;
 mod background;
 mod buffers;
+mod colours;
 mod complete;
 mod context;
 mod document;
@@ -33,16 +34,17 @@ use lsp_types::notification::{
     PublishDiagnostics,
 };
 use lsp_types::request::{
-    CodeActionRequest, Completion, DocumentSymbolRequest, ExecuteCommand, Formatting, GotoDefinition,
-    HoverRequest, Initialize, PrepareRenameRequest, References, Rename, Request as _, Shutdown,
-    SignatureHelpRequest,
+    CodeActionRequest, ColorPresentationRequest, Completion, DocumentColor, DocumentSymbolRequest,
+    ExecuteCommand, Formatting, GotoDefinition, HoverRequest, Initialize, PrepareRenameRequest, References,
+    Rename, Request as _, Shutdown, SignatureHelpRequest,
 };
 use lsp_types::{
-    CancelParams, CodeActionKind, CodeActionOptions, CodeActionProviderCapability, CompletionOptions,
-    ExecuteCommandOptions, ExecuteCommandParams, GotoDefinitionParams, Hover, HoverContents, HoverParams,
-    HoverProviderCapability, InitializeParams, Location, MarkupContent, MarkupKind, NumberOrString, OneOf,
-    PrepareRenameResponse, ReferenceParams, RenameOptions, ServerCapabilities, SignatureHelpOptions,
-    TextDocumentPositionParams, TextDocumentSyncCapability, TextDocumentSyncKind, Uri,
+    CancelParams, CodeActionKind, CodeActionOptions, CodeActionProviderCapability, ColorPresentation,
+    ColorProviderCapability, CompletionOptions, ExecuteCommandOptions, ExecuteCommandParams,
+    GotoDefinitionParams, Hover, HoverContents, HoverParams, HoverProviderCapability, InitializeParams,
+    Location, MarkupContent, MarkupKind, NumberOrString, OneOf, PrepareRenameResponse, ReferenceParams,
+    RenameOptions, ServerCapabilities, SignatureHelpOptions, TextDocumentPositionParams,
+    TextDocumentSyncCapability, TextDocumentSyncKind, Uri,
 };
 use serde::Serialize;
 use serde::de::DeserializeOwned;
@@ -69,7 +71,7 @@ use slices::{Asked, Slices};
                         [[language]]\n  name = \"rfm\"\n  scope = \"source.rfm\"\n  file-types = [\"rfm\"]\n  \
                         comment-token = \"#\"\n  language-servers = [\"rfm\"]\n\n\
                         It offers: messages with quick fixes, layout, what is known of a name, definitions, uses,\n\
-                        completion, other names, symbols, arguments of calls, and the command rfm.slice for previews."
+                        completion, other names, symbols, colours of solids, arguments of calls, and the command rfm.slice for previews."
 )]
 pub(super) struct Lsp {}
 
@@ -213,6 +215,7 @@ fn capabilities(encoding: Encoding) -> ServerCapabilities {
             code_action_kinds: Some(vec![CodeActionKind::QUICKFIX]),
             ..CodeActionOptions::default()
         })),
+        color_provider: Some(ColorProviderCapability::Simple(true)),
         rename_provider: Some(OneOf::Right(RenameOptions {
             prepare_provider: Some(true),
             work_done_progress_options: Default::default(),
@@ -320,6 +323,15 @@ impl Server<'_> {
             DocumentSymbolRequest::METHOD => {
                 let asked = asked::<DocumentSymbolRequest>(parameters)?;
                 given(symbols::of(&*self.document(&asked.text_document.uri)?))
+            }
+            DocumentColor::METHOD => {
+                let asked = asked::<DocumentColor>(parameters)?;
+                given(colours::of(&*self.document(&asked.text_document.uri)?))
+            }
+            // no text of a file makes a colour
+            ColorPresentationRequest::METHOD => {
+                asked::<ColorPresentationRequest>(parameters)?;
+                given(Vec::<ColorPresentation>::new())
             }
             CodeActionRequest::METHOD => {
                 let asked = asked::<CodeActionRequest>(parameters)?;

@@ -17,7 +17,7 @@ use crate::cli::output::Shown;
 pub(super) use format::{ascii_help, format_name, output_help, unit_help, unit_name};
 use rfm::Solid;
 use rfm::field::Field;
-use rfm::geom::Aabb;
+use rfm::geom::{Aabb, to_thousandths};
 use rfm::mesh::{
     self, Grid, GridError, LengthUnit, Mesh, MeshError, Quality, Reference, Resolution, ThinCells, WriteMesh,
     dual_contouring, marching_cubes,
@@ -277,7 +277,7 @@ fn measured(
 /// What hides from a grid, as a sentence without its subject: how much, where, and how many cells would
 /// show it.
 pub(super) fn hidden(thin: &ThinCells, grid: &Grid) -> String {
-    let (what, at) = (if thin.is_gap { "a gap" } else { "a part" }, thin.at);
+    let what = if thin.is_gap { "a gap" } else { "a part" };
     let how = match thin.cells_needed(grid) {
         Some(needed) => format!("{what} {:.2e} thick: about {needed} cells would show it", thin.thickness),
         None if thin.is_wedge => format!("{what} that ends in a sharp edge"),
@@ -287,8 +287,11 @@ pub(super) fn hidden(thin: &ThinCells, grid: &Grid) -> String {
         None => format!("{what} of unknown thickness"),
     };
     format!(
-        "in {} cells between {:.3} and {:.3}, the thinnest at {at:.3}, {how}",
-        thin.count, thin.bounds.min, thin.bounds.max
+        "in {} cells between {:.3} and {:.3}, the thinnest at {:.3}, {how}",
+        thin.count,
+        to_thousandths(thin.bounds.min),
+        to_thousandths(thin.bounds.max),
+        to_thousandths(thin.at)
     )
 }
 

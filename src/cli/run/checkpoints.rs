@@ -73,15 +73,27 @@ impl Checkpoints {
 }
 
 /// The newest sound checkpoint of a run.
-pub(super) fn latest(run_folder: &Path, fingerprint: &[u8; 32]) -> Result<Checkpoint, Failure> {
+///
+/// # Errors
+/// There is none, or it is not one of this scene. `read` are the files that the scene's file names.
+pub(super) fn latest(
+    run_folder: &Path,
+    fingerprint: &[u8; 32],
+    read: &[String],
+) -> Result<Checkpoint, Failure> {
     let folder = run_folder.join(FOLDER);
     let mut faults = Vec::new();
     for steps in list(&folder).into_iter().rev() {
         let path = path(&folder, steps);
-        match read(&path) {
+        match sound(&path) {
             Ok(checkpoint) if checkpoint.fingerprint != *fingerprint => {
+                // one number stands for the scene and all that it reads
+                let files = match read {
+                    [] => String::new(),
+                    files => format!(" or a file that it reads ({})", listed(files)),
+                };
                 return Err(Failure::usage(format!(
-                    "cannot go on from `{}`: it belongs to another scene, or this one was changed since; only the \
+                    "cannot go on from `{}`: it belongs to another scene, or this one{files} was changed since; only the \
                      `run` block and probes may change (with --force instead of --resume the run begins anew)",
                     path.shown()
                 )));
@@ -146,7 +158,18 @@ impl std::fmt::Display for Unusable {
     }
 }
 
-fn read(path: &Path) -> Result<Checkpoint, Unusable> {
+/// The names of files: the first few, and how many others there are.
+fn listed(files: &[String]) -> String {
+    const SHOWN: usize = 5;
+    let mut names: Vec<String> =
+        files.iter().take(SHOWN).map(|name| format!("`{}`", Path::new(name).shown())).collect();
+    if files.len() > SHOWN {
+        names.push(format!("{} more", files.len() - SHOWN));
+    }
+    names.join(", ")
+}
+
+fn sound(path: &Path) -> Result<Checkpoint, Unusable> {
     let bytes = std::fs::read(path).map_err(Unusable::File)?;
     Checkpoint::read(&bytes).map_err(Unusable::Content)
 }

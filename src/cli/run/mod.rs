@@ -56,7 +56,8 @@ pub(super) fn run(shared: &Shared, options: &Run) -> Result<(), Failure> {
     folder::may_be_written(&folder, options, experiment.scene())?;
     // a folder that is not there yet is made only after all that can fail
     let held = folder.exists().then(|| Hold::take(&folder)).transpose()?;
-    let resumed = options.resume.then(|| checkpoints::latest(&folder, &fingerprint)).transpose()?;
+    let read = program.files().asked();
+    let resumed = options.resume.then(|| checkpoints::latest(&folder, &fingerprint, &read)).transpose()?;
     let (mut simulation, carved) = match &resumed {
         Some(checkpoint) => (experiment.resume(checkpoint).map_err(Failure::usage)?, 0),
         None => {

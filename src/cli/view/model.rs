@@ -29,7 +29,7 @@ pub(super) struct Subject {
     cells: usize,
     define: BTreeMap<String, f64>,
     dimensions: BTreeMap<String, Dimension>,
-    max_nodes: usize,
+    max_nodes: Option<usize>,
     /// The files that it names.
     files: Files,
     engine: Engine,
