@@ -74,7 +74,7 @@ pub(super) struct Shared {
     /// Let a file import and read files outside of its own folder
     #[arg(long, global = true, hide_short_help = true)]
     pub allow_outside: bool,
-    /// Operations that a file may unroll to [default: 1000000, or 4 for each byte of a longer file]
+    /// Operations that a file may unroll to [default: 1000000, or 4 for each byte of a longer file with its imports]
     #[arg(long, value_name = "N", global = true, hide_short_help = true)]
     pub max_nodes: Option<usize>,
     /// What evaluates ω: machine code or the interpreter, which gives the same bits

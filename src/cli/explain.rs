@@ -55,8 +55,8 @@ pub(super) fn run(shared: &Shared, options: &Explain) -> Result<(), Failure> {
         say!("{}", text.trim_end());
         return Ok(());
     }
-    let is_word = subject.trim_start_matches('.').chars().all(is_of_a_word);
-    if is_word && !is_file {
+    let word = subject.trim_start_matches('.');
+    if !is_file && !word.is_empty() && word.chars().all(is_of_a_word) {
         let names = page::names();
         let near = nearest(subject, names.iter().map(String::as_str));
         let near = near.map_or(String::new(), |near| format!("; did you mean `{near}`?"));

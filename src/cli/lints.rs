@@ -7,7 +7,7 @@ use rfm::geom::{Aabb, to_thousandths};
 use rfm::glam::DVec3;
 use rfm::ir::Node;
 use rfm::lower::{Measured, NamedSolid, Obstacle, Scene};
-use rfm::solid::{Break, Breakage, ThinPart, Uneven};
+use rfm::solid::{Break, Breakage, ProgramKind, ThinPart, Uneven};
 use rfm::syntax::ast::Item;
 use rfm::{Engine, Error, Experiment, Program, Solid, experiment};
 
@@ -175,7 +175,7 @@ impl<'a> Subject<'a> {
     fn seam(&self, at: DVec3) -> Diagnostic {
         let message = format!("ω of solid `{}` is 0 within it, at {}", self.name, point(at));
         self.warning(Code::SEAM, self.text, message, "there is a surface without an outside".into())
-            .help("draw an outline that is turned beyond its axis: to x < 0 for `.revolve()`")
+            .help("if an outline is turned there, draw it beyond its axis: to x < 0 for `.revolve()`")
     }
 
     fn jump(&self, jump: &Break) -> Diagnostic {
@@ -209,7 +209,8 @@ impl<'a> Subject<'a> {
 /// A shape, the widths, m, below which walls and gaps are told of, and the box of the scene.
 type Search = (Node, [f64; 2], Aabb);
 
-/// Warnings about obstacles that the particles of their scenes are too large for.
+/// Warnings about obstacles that the particles of their scenes are too large for, and about fluids that lie in obstacles. The walls
+/// of a container are not looked at.
 pub(super) fn of_scenes(
     engine: Engine,
     program: &Program,
@@ -236,23 +237,29 @@ pub(super) fn of_scenes(
     Ok(found)
 }
 
-/// A warning if a large part of the fluid's shape lies in obstacles, and an error if all of it does. Where obstacles stand in a
-/// fluid that is drawn as if they were not there, as posts in a tank do, they take less.
+/// A warning if a large part of the fluid's shape lies in obstacles, and an error if nothing of it is left. Where obstacles stand
+/// in a fluid that is drawn as if they were not there, as posts in a tank do, they take less.
 fn in_obstacles(scene: &Scene, fluid: &Solid, obstacles: &[Solid]) -> Option<Diagnostic> {
-    let part = experiment::part_in_obstacles(fluid, obstacles, &scene.domain)?;
+    let operations = |solid: &Solid| solid.graph(ProgramKind::Value).0.len();
+    if obstacles.iter().map(operations).sum::<usize>() > MOST_OPERATIONS {
+        return None;
+    }
+    let taken = experiment::taken_by_obstacles(fluid, obstacles, &scene.domain)?;
     let (span, help) = (scene.fluid.shape_span, "move the shape of the fluid out of the obstacles");
-    if part == 1.0 {
+    if taken.is_all {
         let message = "no particle finds room: all of the fluid's shape lies in obstacles";
         return Some(Diagnostic::error(Code::OBSTACLE_FILLS_BOX, span, message).help(help));
     }
-    (part > MUCH).then(|| {
-        let message = format!(
-            "{:.0} % of the fluid's shape lies in obstacles, where no particle is placed",
-            100.0 * part
-        );
+    (taken.part > MUCH).then(|| {
+        let part = 100.0 * taken.part;
+        let message =
+            format!("{part:.0} % of the fluid's shape lies in obstacles, where no particle is placed");
         Diagnostic::warning(Code::FLUID_IN_OBSTACLE, span, message).help(help)
     })
 }
+
+/// Obstacles with more operations are not looked at for what they take of the fluid: that would take seconds.
+const MOST_OPERATIONS: usize = 2000;
 
 /// Part of a fluid's shape in obstacles from which on it is told of.
 const MUCH: f64 = 0.25;

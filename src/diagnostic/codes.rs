@@ -87,7 +87,7 @@ OUT_OF_RANGE = "E0209":
 "The value lies outside the range that is allowed for it: a size that must be positive, or a param outside its
 declared `in a .. b`.";
 TOO_LARGE = "E0210":
-"The file unrolls to more operations than the limit: 1 million, 4 for each byte of a file that is longer than 250 kB, or what
+"The file unrolls to more operations than the limit: 1 million, 4 for each byte where the file and what it imports are longer than 250 kB, or what
 --max-nodes says. A range such as `0..1000000` may have too many members.";
 OVERRIDE = "E0211":
 "A param is set that the file does not declare with `param name = …`, or to a value outside the range that the declaration
@@ -242,13 +242,6 @@ SINGULAR = "W0418":
 "Outside of the solid, in the scene that has it as an obstacle or close to it, ω has no value: a divisor is zero there, or a
 root or a logarithm is taken of a negative number. What comes near is neither inside nor outside, and a run stops there. Keep
 the formula away from that place by `max`, or choose another one by `where`: `where(x > 0, ln(max(x, 1e-9)), -20)`.";
-SEAM = "W0420":
-"ω is zero on a line or a face within the solid. Values there count as outside, distances and contacts know a surface there, and a
-mesh may have a hole. Most often an outline that is turned about an axis has an edge on it: draw it beyond the axis, which hides
-that edge.
-
-    rfm 1
-    solid can = polygon([[-0.1, 0], [0.5, 0], [0.5, 1], [-0.1, 1]]).revolve()";
 NO_EDGE = "W0419":
 "`.round(radius)` makes arcs of the edges at which the parts of a shape are joined by `and`, `or` and `\\`. This shape is one
 formula, or its parts are joined further inside: `min`, `max` and `blend` keep their edges, and `.taper` makes one formula of what it
@@ -256,9 +249,16 @@ narrows. Round the shape before that.
 
     rfm 1
     solid tablet = box().round(0.1).taper(1, 0.5)";
+SEAM = "W0420":
+"ω is zero on a line within the solid. Not every such line is looked for: only the middle axes of the solid and of the scene. Values there count as outside, distances and contacts know a surface there, and a
+mesh may have a hole. Most often an outline that is turned about an axis has an edge on it: draw it beyond the axis, which hides
+that edge.
+
+    rfm 1
+    solid can = polygon([[-0.1, 0], [0.5, 0], [0.5, 1], [-0.1, 1]]).revolve()";
 FLUID_IN_OBSTACLE = "W0501":
 "Part of the fluid's shape lies inside an obstacle or outside the box. Those particles are carved off before the
-run starts.";
+run starts. `rfm check` and editors tell of it where obstacles take more than a quarter of the shape.";
 FLUID_OUTSIDE_BOX = "W0504":
 "Part of the fluid's shape lies outside the scene's box. The fluid is filled into the part within the box, so there is
 less of it than the shape says. Make the box larger, move the shape, or cut the shape where the box ends.";

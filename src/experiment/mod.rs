@@ -47,7 +47,7 @@ pub use filling::spacing;
 pub use mean::Mean;
 pub use parameters::TimeStep;
 pub use probes::{probe_column, probe_of};
-pub use room::part_in_obstacles;
+pub use room::{Taken, taken_by_obstacles};
 
 /// A scene, compiled and checked: all that a simulation needs besides its particles.
 pub struct Experiment {

@@ -6,7 +6,7 @@ use super::{Experiment, refuse};
 use crate::Solid;
 use crate::compile::Error;
 use crate::diagnostic::{Code, Diagnostic, Span};
-use crate::field::Field;
+use crate::field::{Field, Region, is_flat};
 use crate::geom::{Aabb, to_thousandths};
 use crate::lower::Scene;
 use crate::solid::Bounds;
@@ -91,7 +91,7 @@ impl Experiment {
             }
         };
         let within = bounds.intersection(&domain);
-        if within.is_empty() || within.size().min_element() <= 0.0 {
+        if is_flat(&within) {
             let message = "the shape of the fluid lies outside the box".to_string();
             let reach =
                 format!("it lies between {} and {}", to_thousandths(bounds.min), to_thousandths(bounds.max));
@@ -298,24 +298,42 @@ impl Experiment {
     }
 }
 
-/// The part of a fluid's shape within a box that lies in obstacles at the start, found by samples; `None` if they meet
-/// nothing of the shape.
-pub fn part_in_obstacles(fluid: &Solid, obstacles: &[Solid], domain: &Aabb) -> Option<f64> {
+/// What obstacles take of a fluid's shape.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Taken {
+    /// The part of the shape that lies in them at the start, by samples.
+    pub part: f64,
+    /// Whether nothing is left of it: no volume is found outside of them.
+    pub is_all: bool,
+}
+
+/// What obstacles take of a fluid's shape within a box; `None` if no sample meets the shape.
+pub fn taken_by_obstacles(fluid: &Solid, obstacles: &[Solid], domain: &Aabb) -> Option<Taken> {
     let within = match fluid.bounds() {
         Bounds::Within(bounds) => bounds.intersection(domain),
         Bounds::Unbounded => *domain,
         Bounds::Empty => return None,
     };
-    if within.is_empty() {
+    if is_flat(&within) {
         return None;
     }
     let is_taken = |p: DVec3| obstacles.iter().any(|obstacle| obstacle.omega(p) >= 0.0);
+    // fewer places for many obstacles
+    let every = 1 + obstacles.len() / 4;
     let (mut all, mut taken) = (0.0, 0.0);
-    for p in samples(&within).filter(|p| fluid.omega(*p) > 0.0) {
+    for p in samples(&within).step_by(every).filter(|p| fluid.omega(*p) > 0.0) {
         all += 1.0;
         taken += f64::from(u8::from(is_taken(p)));
     }
-    (all > 0.0).then(|| taken / all)
+    if all == 0.0 {
+        return None;
+    }
+    // a film may lie between samples
+    let free = || {
+        let bodies = obstacles.iter().map(|obstacle| obstacle as &dyn Field).collect();
+        Region { shape: fluid, bodies, within }.volume()
+    };
+    Some(Taken { part: taken / all, is_all: taken == all && free() == 0.0 })
 }
 
 /// Points in the middles of equal cells that fill a box.

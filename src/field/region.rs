@@ -21,11 +21,19 @@ pub(crate) struct Region<'a> {
     pub within: Aabb,
 }
 
+/// Whether a box is empty, or so thin that rounding alone may have left it: what lies in it has no volume.
+pub fn is_flat(within: &Aabb) -> bool {
+    within.is_empty() || within.size().min_element() <= FLAT * within.size().max_element()
+}
+
+/// Thickness of a flat box over its width.
+const FLAT: f64 = 1e-12;
+
 impl Region<'_> {
     /// The volume, m³. Boxes that the ranges of the fields decide count as a whole; the others are halved, and those of
     /// the last size cut by the surface. A place where a field is undefined does not count.
     pub fn volume(&self) -> f64 {
-        if self.within.is_empty() {
+        if is_flat(&self.within) {
             return 0.0;
         }
         let bodies: Vec<usize> = (0..self.bodies.len()).collect();

@@ -102,7 +102,7 @@ impl Lowering<'_> {
         if !self.may_be_local(variable) {
             return Value::Failed;
         }
-        self.has_repeated |= values.len() > 1;
+        self.has_repeated |= values.len() > 1 && span.source.is_users();
         let is_range = matches!(members, Members::Range(..));
         let mut results = Vec::new();
         for value in values.iter().cloned() {

@@ -37,7 +37,7 @@ scene work {
     );
     simulation.advance(0.5, |_| ControlFlow::Continue(())).unwrap();
     let given = 0.5 * 0.3 * 16.0;
-    let (found, work) = (energy(&mut simulation), simulation.audit().wall_work());
+    let (found, work) = (energy(&mut simulation), simulation.audit().wall_work().unwrap());
     assert!((found - given).abs() < 1e-9 && (work - given).abs() < 1e-9, "{found} {work}");
     assert!(simulation.audit().energy_excess().unwrap() < 1e-9);
 }
@@ -63,9 +63,10 @@ fn a_piston_gives_what_the_water_has_then() {
         simulation.advance(1.2, |_| ControlFlow::Continue(())).unwrap();
         let gained = energy(&mut simulation) - before;
         let audit = simulation.audit();
-        let (work, excess) = (audit.wall_work(), audit.energy_excess().unwrap());
+        let (work, excess) = (audit.wall_work().unwrap(), audit.energy_excess().unwrap());
         println!("{method}: {work:.2} J of work, {gained:.2} J gained, {excess:.1e}");
         assert!(gained > 50.0 && (gained / work - 1.0).abs() < 0.04, "{method}: {gained} of {work}");
+        // dfsph also displaces particles without a force, and settles it later: 0.6 %. More than 1 % would be a finding
         assert!(excess < 8e-3, "{method}: {excess}");
         assert_eq!(simulation.findings(), [], "{method}");
     }
@@ -84,19 +85,19 @@ fn work_does_not_depend_on_whether_forces_are_asked_for() {
             }
             simulation.advance(0.6, |_| ControlFlow::Continue(())).unwrap();
             let audit = simulation.audit();
-            println!("{method}: {} J, {:?}", audit.wall_work(), audit.energy_excess());
-            audit.wall_work()
+            audit.wall_work().unwrap()
         });
-        assert!((work / of_all_steps - 1.0).abs() < 0.01, "{method}: {work} {of_all_steps}");
+        // only what is wrong with the rough division is found in one of eight steps: 0.04 %
+        assert!((work / of_all_steps - 1.0).abs() < 0.005, "{method}: {work} {of_all_steps}");
     }
 }
 
-/// Water that has dissipated most of what a stirrer gave, and then gains speed from nowhere.
+/// Water that has dissipated most of what a stirrer gave, and then gains speed from nowhere, less than it has lost before.
 #[test]
 fn energy_from_nowhere_is_found_beside_a_stirrer() {
     let experiment = experiment(
         "rfm 1
-solid blade = box([-0.3, -0.05, 0], [0.3, 0.05, 0.3]).rotate_z(6*t)
+solid blade = box([-0.3, -0.05, 0], [0.3, 0.05, 0.3]).rotate_z(9*t)
 scene work {
   box { min: [-0.4, -0.4, 0], max: [0.4, 0.4, 0.8] }
   obstacle { solid: blade, restitution: 0 }
@@ -106,16 +107,81 @@ scene work {
 }",
     );
     let mut simulation = experiment.start().unwrap_or_else(|e| panic!("{e}")).simulation;
-    simulation.advance(0.5, |_| ControlFlow::Continue(())).unwrap();
+    let before = energy(&mut simulation);
+    simulation.advance(1.0, |_| ControlFlow::Continue(())).unwrap();
     assert_eq!(simulation.findings(), []);
-    let audit = simulation.audit();
-    let (work, at_start) = (audit.wall_work(), 1000.0 * 0.24 * 9.81 * 0.2);
-    assert!(work > 0.1 * at_start, "{work}");
+    let work = simulation.audit().wall_work().unwrap();
+    let lost = work - (energy(&mut simulation) - before);
     let mut checkpoint = simulation.checkpoint();
-    let column = checkpoint.get("velocity z").unwrap().iter().map(|v| v + 1.0).collect();
-    checkpoint.set("velocity z", column);
+    let kicked: Vec<f64> = checkpoint.get("velocity z").unwrap().iter().map(|v| v + 0.4).collect();
+    let squares = |column: &[f64]| column.iter().map(|v| v * v).sum::<f64>();
+    let mass = simulation.parameters().particle_mass;
+    let kick = 0.5 * mass * (squares(&kicked) - squares(checkpoint.get("velocity z").unwrap()));
+    assert!(
+        0.0 < kick && kick < 0.5 * lost,
+        "the energy at the start would not show it: {kick} J of {lost} J"
+    );
+    checkpoint.set("velocity z", kicked);
     let mut simulation = experiment.resume(&checkpoint).unwrap();
-    assert_eq!(simulation.audit().wall_work(), work, "it goes on from the checkpoint");
-    simulation.step().unwrap();
+    assert_eq!(simulation.audit().wall_work(), Some(work), "it goes on from the checkpoint");
+    // the audit looks at means of eight steps
+    for _ in 0..16 {
+        simulation.step().unwrap();
+    }
     assert!(matches!(simulation.findings()[..], [(Finding::Energy, _)]), "{:?}", simulation.findings());
+}
+
+/// A drum that turns in a fluid which sticks to it: at last its power is what the closed form says, 4πµLΩ²·a²b²/(b² − a²). With
+/// five spacings across the gap the friction is off by some per cent.
+#[test]
+fn a_drum_works_by_friction() {
+    let mut simulation = start(
+        "rfm 1
+let r2 = x^2 + y^2
+solid drum = cylinder(0.5, 2).move([0, 0, -1])
+solid vessel = cylinder(1, 2).move([0, 0, -1])
+scene work {
+  box       { min: [-1.1, -1.1, 0], max: [1.1, 1.1, 0.4] }
+  container { solid: vessel, walls: no_slip, restitution: 0 }
+  obstacle  { solid: drum, walls: no_slip, surface_velocity: [-2*y, 2*x, 0], restitution: 0 }
+  fluid oil { shape: 0.25 <= r2 <= 1, density: 1000, spacing: 0.1, viscosity: 100 }
+  gravity: [0, 0, 0]
+  method: dfsph
+  run       { until: 2 s }
+}",
+    );
+    let mut after = |until: f64| {
+        simulation.advance(until, |_| ControlFlow::Continue(())).unwrap();
+        simulation.audit().wall_work().unwrap()
+    };
+    let (early, late) = (after(1.5), after(2.0));
+    let power = (late - early) / 0.5;
+    let exact = 4.0 * std::f64::consts::PI * 100.0 * 0.4 * 4.0 * 0.25 / 0.75;
+    println!("{power:.1} W for {exact:.1}");
+    assert!((power / exact - 1.0).abs() < 0.15, "{power} {exact}");
+    assert!(simulation.audit().energy_excess().unwrap() < 1e-2);
+}
+
+/// A vessel that goes up and down: the work of a period comes back, and its errors do not add up to a finding.
+#[test]
+fn a_vessel_that_heaves_takes_back_what_it_gives() {
+    for method in ["wcsph", "dfsph"] {
+        let mut simulation = start(
+            &"rfm 1
+let way = 0.1*sin(4*t)
+solid inside = box([-0.3, -0.3, 0.2], [0.3, 0.3, 1]).move([0, 0, way])
+scene work {
+  box { min: [-0.4, -0.4, 0], max: [0.4, 0.4, 1.3] }
+  container { solid: inside, restitution: 0 }
+  fluid water { shape: box([-0.3, -0.3, 0.2], [0.3, 0.3, 0.5]), density: 1000, spacing: 0.05 }
+  method: METHOD
+  run { until: 5 s }
+}"
+            .replace("METHOD", method),
+        );
+        simulation.advance(5.0, |_| ControlFlow::Continue(())).unwrap();
+        let audit = simulation.audit();
+        println!("{method}: {:?} J, {:?}", audit.wall_work(), audit.energy_excess());
+        assert_eq!(simulation.findings(), [], "{method}");
+    }
 }

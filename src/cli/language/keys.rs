@@ -81,8 +81,13 @@ const FLUID: Rows = &[
     ),
     ("particles", "", "as the method says, or as many as fill the shape", "the number of particles"),
     ("density", "kg/m³", "998.29", "the density at rest"),
-    ("mass", "kg", "0.02", "the mass of a particle; `spacing` may stand in its place"),
-    ("spacing", "m", "from the mass", "the distance of neighbouring particles; the mass is density·spacing³"),
+    ("mass", "kg", "0.02", "the mass of a particle, unless `spacing` stands in its place"),
+    (
+        "spacing",
+        "m",
+        "from the mass",
+        "the distance of neighbouring particles, from which their mass follows",
+    ),
     ("viscosity", "Pa·s", "that of the method", "the dynamic viscosity"),
     ("surface_tension", "N/m", "that of the method", "the surface tension"),
     (
@@ -119,9 +124,9 @@ const TRUTH: Rows = &[
 ];
 
 const PROBE: Rows = &[
-    ("height", "m", "", "measures the height of the surface above a place [x, y]"),
-    ("pressure", "m", "", "measures the pressure at a place, in Pa"),
-    ("velocity", "m", "", "measures the velocity at a place, in m/s"),
+    ("height", "", "", "measures the height of the surface, in m, above a place [x, y], in m"),
+    ("pressure", "", "", "measures the pressure, in Pa, at a place, in m"),
+    ("velocity", "", "", "measures the velocity, in m/s, at a place, in m"),
     ("force", "", "", "measures the force on an obstacle, in N, and its torque, in N·m"),
     ("flux", "", "", "the block for a plane: measures how much flows through it, in kg/s"),
     ("energy", "", "", "measures the energies of the fluid with this name, in J"),

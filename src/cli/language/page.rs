@@ -7,7 +7,7 @@ use rfm::sph::Method;
 
 use super::{
     keys,
-    words::{self, ITEMS, Signature},
+    words::{self, ITEMS, SIGNS, Signature},
 };
 
 /// What `rfm explain words` prints begins so.
@@ -25,6 +25,10 @@ pub(in crate::cli) fn all() -> String {
     for (word, about) in ITEMS {
         page += &entry(word, about);
     }
+    page += "\n## Between them\n\n";
+    for (word, about) in SIGNS {
+        page += &entry(word, about);
+    }
     page += "\n## Functions\n\n";
     for function in sorted(words::functions()) {
         page += &entry(&function.label(), &function.about);
@@ -36,7 +40,11 @@ pub(in crate::cli) fn all() -> String {
     for block in keys::blocks() {
         let title = block.map_or("Keys of a scene".to_string(), |block| format!("Keys of `{block}`"));
         write!(page, "\n## {title}\n\n").expect("texts take all that is written");
-        for key in vocabulary::keys(block, Method::default()) {
+        let own = Method::default().info().keys;
+        let of_methods =
+            |key: &&str| own.iter().any(|own| own.name == *key && Some(own.block.name()) == block);
+        let keys = vocabulary::keys(block, Method::default());
+        for key in keys.into_iter().filter(|key| !of_methods(key)) {
             page += &entry(key, &keys::about(block, key, Some(Method::default())));
         }
     }
@@ -48,7 +56,7 @@ pub(in crate::cli) fn of(word: &str) -> Option<String> {
     let word = word.trim_start_matches('.');
     let mut found = String::new();
     let is_it = |signature: &Signature| signature.name == word;
-    for (_, about) in ITEMS.iter().filter(|(name, _)| *name == word) {
+    for (_, about) in ITEMS.iter().chain(&SIGNS).filter(|(name, _)| *name == word) {
         found += &entry(word, about);
     }
     for function in words::functions().into_iter().filter(is_it) {
@@ -89,8 +97,13 @@ pub(in crate::cli) fn names() -> Vec<String> {
     let keys = keys::blocks().flat_map(|block| {
         Method::all().into_iter().flat_map(move |method| vocabulary::keys(block, method)).map(String::from)
     });
-    let mut names: Vec<String> =
-        ITEMS.iter().map(|(word, _)| (*word).to_string()).chain(signatures).chain(keys).collect();
+    let mut names: Vec<String> = ITEMS
+        .iter()
+        .chain(&SIGNS)
+        .map(|(word, _)| (*word).to_string())
+        .chain(signatures)
+        .chain(keys)
+        .collect();
     names.sort();
     names.dedup();
     names
@@ -117,9 +130,9 @@ mod tests {
     fn every_word_has_an_entry() {
         for name in names() {
             let found = of(&name).unwrap_or_else(|| panic!("{name} is not explained"));
-            assert!(found.lines().all(|line| line.len() > name.len() + 6), "{found}");
+            assert!(found.lines().all(|line| line.contains(": ")), "{found}");
         }
-        assert_eq!(of("spheroid"), None);
+        assert_eq!((of("spheroid"), of("")), (None, None));
         let spacing = of("spacing").unwrap();
         assert!(spacing.contains("key of `fluid`") && spacing.contains("in m"), "{spacing}");
         assert!(of(".twist").unwrap().contains("shape.twist(turns)"));

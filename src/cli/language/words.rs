@@ -33,6 +33,27 @@ pub(in crate::cli) const ITEMS: [(&str, &str); 6] = [
     ("scene", "what a simulation needs"),
 ];
 
+/// Words and names that have a meaning of their own between functions.
+pub(in crate::cli) const SIGNS: [(&str, &str); 14] = [
+    ("x", "the first coordinate of the point, in m"),
+    ("y", "the second coordinate of the point, in m"),
+    ("z", "the third coordinate of the point, in m; upwards"),
+    ("t", "the time, in s"),
+    ("pi", "the half circumference of a circle of radius 1"),
+    ("and", "what lies in both shapes: a + b − √(a² + b²); comparisons are shapes"),
+    ("or", "what lies in one of two shapes: a + b + √(a² + b²)"),
+    ("not", "what lies outside of a shape; `a \\ b` is `a and not b`"),
+    (
+        "any",
+        "a fold by `or`: `any i in 0..6: sphere(0.3).move([i, 0, 0])`, or through a list `any p in points: …`",
+    ),
+    ("all", "a fold by `and`: `all i in 0..6: x*cos(i) + y*sin(i) <= 1`"),
+    ("sum", "a fold by `+`: `sum k in 1..4: sin(k*x)/k`"),
+    ("product", "a fold by `*`: `product k in 1..4: k`"),
+    ("min", "a fold as well: `min p in list: length(p - [x, y, z])`, the smallest of all members"),
+    ("max", "a fold as well: `max p in list: p.z`, the largest of all members"),
+];
+
 /// Functions that are no text of the prelude: name, parameters, meaning.
 const FUNCTIONS: &[(&str, &str, &str)] = &[
     ("sqrt", "e", "the square root"),

@@ -90,10 +90,10 @@ pub(super) fn latest(
                 // one number stands for the scene and all that it reads
                 let files = match read {
                     [] => String::new(),
-                    files => format!(" or a file that it reads ({})", listed(files)),
+                    files => format!(", or a file that it reads ({}),", listed(files)),
                 };
                 return Err(Failure::usage(format!(
-                    "cannot go on from `{}`: it belongs to another scene, or this one{files} was changed since; only the \
+                    "cannot go on from `{}`: it belongs to another scene, or this scene{files} has changed since; only the \
                      `run` block and probes may change (with --force instead of --resume the run begins anew)",
                     path.shown()
                 )));

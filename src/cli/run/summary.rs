@@ -40,13 +40,13 @@ pub(super) struct Summary {
     potential_energy: f64,
     energy_at_start: f64,
     /// The greatest excess of the energy over that at the start and the work of gravity and walls, as a part of the greatest
-    /// energy so far, after any step; null if it cannot be judged.
+    /// energy so far; where walls move, over the least that was left of it. Null if it cannot be judged.
     energy_excess: Option<f64>,
     /// Why it cannot be judged.
     #[serde(skip_serializing_if = "Option::is_none")]
     energy_unjudged: Option<&'static str>,
-    /// The work of walls that move on the fluid, J.
-    wall_work: f64,
+    /// The work of walls that move on the fluid, J; null if the energy cannot be judged.
+    wall_work: Option<f64>,
     /// The largest change of the fluid's volume by the places of its particles, as a part of it.
     volume_change: f64,
     /// The largest mean compression by the places of the particles, as a part of the rest density.
@@ -166,14 +166,16 @@ pub(super) fn print(summary: &Summary, frames: &Frames, probes: &Probes) {
         "energy: {} J at the start, {} J at the end; {}",
         readable(summary.energy_at_start),
         readable(summary.kinetic_energy + summary.potential_energy),
-        match (summary.energy_excess, summary.energy_unjudged) {
-            (Some(excess), _) if summary.wall_work != 0.0 => format!(
-                "walls gave {} J; never more than {excess:.2e} of the most from nowhere",
-                readable(summary.wall_work)
-            ),
-            (Some(excess), _) => format!("never more than {excess:.2e} of it above what gravity gave"),
-            (None, Some(why)) => format!("not judged: {why}"),
-            (None, None) => "not judged".to_string(),
+        match (summary.energy_excess, summary.wall_work, summary.energy_unjudged) {
+            (Some(excess), Some(work), _) if work != 0.0 => {
+                format!(
+                    "walls gave {} J; at most {excess:.2e} of the greatest energy came from nowhere",
+                    readable(work)
+                )
+            }
+            (Some(excess), ..) => format!("never more than {excess:.2e} of it above what gravity gave"),
+            (None, _, Some(why)) => format!("not judged: {why}"),
+            (None, _, None) => "not judged".to_string(),
         }
     );
     say!(

@@ -51,6 +51,9 @@ impl Boundary {
                 continue;
             }
             let (wall, before) = (self.wall_velocity(k, out), velocity);
+            if !wall.is_finite() {
+                return Err(Undefined { at: out }.into());
+            }
             let normal = (-field.omega_grad(out).1).try_normalize().unwrap_or((out - at).normalize_or_zero());
             velocity = wall + reflect(velocity - wall, normal, obstacle.restitution);
             hit(k, velocity - before, wall, out);

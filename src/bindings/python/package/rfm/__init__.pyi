@@ -67,7 +67,7 @@ class Collisions(NamedTuple):
 class Audit(NamedTuple):
     energy_excess: float | None
     unjudged: str | None
-    wall_work: float
+    wall_work: float | None
     volume_change: float
     compression_mean: float
     compression_p99: float

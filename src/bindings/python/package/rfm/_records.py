@@ -58,7 +58,7 @@ Audit.__module__ = "rfm"
 Audit.__doc__ = """What a simulation has shown since its start; the worst figures, as parts, and speeds in m/s.
 
 ``energy_excess`` is None if the energy is not judged; ``unjudged`` then says why. ``wall_work`` is the
-work of walls that move on the fluid, in J. ``findings`` are sentences about
+work of walls that move on the fluid, in J, None if the energy is not judged. ``findings`` are sentences about
 what a user must know.
 """
 
