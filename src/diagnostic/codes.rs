@@ -250,8 +250,8 @@ narrows. Round the shape before that.
     rfm 1
     solid tablet = box().round(0.1).taper(1, 0.5)";
 SEAM = "W0420":
-"ω is zero on a line within the solid. Not every such line is looked for: only the middle axes of the solid and of the scene. Values there count as outside, distances and contacts know a surface there, and a
-mesh may have a hole. Most often an outline that is turned about an axis has an edge on it: draw it beyond the axis, which hides
+"ω is zero on a line within the solid. Values there count as outside, distances and contacts know a surface there, and a mesh may
+have a hole. Only the axes of the scene and the middle axes of the solid are looked at. Most often an outline that is turned about an axis has an edge on it: draw it beyond the axis, which hides
 that edge.
 
     rfm 1
