@@ -87,8 +87,8 @@ OUT_OF_RANGE = "E0209":
 "The value lies outside the range that is allowed for it: a size that must be positive, or a param outside its
 declared `in a .. b`.";
 TOO_LARGE = "E0210":
-"The file unrolls to more operations than the limit: 1 million, 4 for each byte where the file and what it imports are longer than 250 kB, or what
---max-nodes says. A range such as `0..1000000` may have too many members.";
+"The file unrolls to more operations than the limit: 1 million, or 4 for each byte of the file and what it imports if that is
+more, or what --max-nodes says. A range such as `0..1000000` may have too many members.";
 OVERRIDE = "E0211":
 "A param is set that the file does not declare with `param name = …`, or to a value outside the range that the declaration
 states, or with another unit. Params are set by `-D name=value`, by files that `-P` names, or by a program.";
@@ -251,8 +251,8 @@ narrows. Round the shape before that.
     solid tablet = box().round(0.1).taper(1, 0.5)";
 SEAM = "W0420":
 "ω is zero on a line within the solid. Values there count as outside, distances and contacts know a surface there, and a mesh may
-have a hole. Only the axes of the scene and the middle axes of the solid are looked at. Most often an outline that is turned about an axis has an edge on it: draw it beyond the axis, which hides
-that edge.
+have a hole. Only the axes of the scene and the middle axes of the solid are looked at. Most often an outline that is turned
+about an axis has an edge on it: draw it beyond the axis, which hides that edge.
 
     rfm 1
     solid can = polygon([[-0.1, 0], [0.5, 0], [0.5, 1], [-0.1, 1]]).revolve()";
@@ -294,10 +294,11 @@ LONG_STEP = "W0503":
 "The time step is longer than what is stable when particles fall through the whole box. The run may still go well if
 they never become so fast; without `dt` a stable step is derived.";
 ENERGY_GREW = "W0511":
-"The run's energy rose by more than 1 % above what it had at the start and the work of gravity and of moving walls since then;
-where walls move, by more than 1 % of the greatest energy so far above what was left of that. No fluid does that: the method made energy of its errors. What moves faster or higher than it could is wrong from then on. More particles,
-more `artificial_viscosity` (wcsph), or the other method may help; `energy_excess` in the summary has the largest value, and
-the probe `audit` shows when it arose. A run whose energy doubles stops.";
+"The run's energy rose by more than 1 % above what it had at the start and gravity's work since then; where walls move, above
+what was left of that and their work, by more than 1 % of the greatest energy so far. No fluid does that: the method made energy
+of its errors. What moves faster or higher than it could is wrong from then on. More particles, more `artificial_viscosity`
+(wcsph), or the other method may help; `energy_excess` in the summary has the largest value, and the probe `audit` shows when it
+arose. A run whose energy doubles stops, unless walls move.";
 VOLUME_CHANGED = "W0512":
 "The places of the particles take up 2 % more or less room than at the start. Where particles crowd, the fluid has lost
 volume: levels are too low and what hits them comes too late. `volume_change` in the summary has the largest value.";
