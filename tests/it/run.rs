@@ -547,7 +547,7 @@ fn a_file_that_a_scene_reads_is_named_if_a_run_cannot_go_on() {
     std::fs::write(here.join("outline.csv"), "0.4,0.4\n0.6,0.4\n0.5,0.61\n").unwrap();
     let refused = run(here, &["out", "--resume"]).expect(2).stderr;
     assert!(
-        refused.contains("or this one or a file that it reads (`outline.csv`) was changed since"),
+        refused.contains("or this scene, or a file that it reads (`outline.csv`), has changed since"),
         "{refused}"
     );
 }
