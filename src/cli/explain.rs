@@ -46,26 +46,21 @@ pub(super) fn run(shared: &Shared, options: &Explain) -> Result<(), Failure> {
     if is_code && subject[1..].bytes().all(|b| b.is_ascii_digit()) {
         return Err(Failure::usage(format!("there is no message {subject}: `rfm explain codes` lists all")));
     }
-    let is_file = Path::new(choose::subject(subject).0).exists();
-    if subject == "words" && !is_file {
-        say!("{}", page::all().trim_end());
-        return Ok(());
-    }
-    if let Some(text) = page::of(subject).filter(|_| !is_file) {
-        say!("{}", text.trim_end());
-        return Ok(());
-    }
-    let word = subject.trim_start_matches('.');
-    if !is_file && !word.is_empty() && word.chars().all(is_of_a_word) {
-        let names = page::names();
-        let near = nearest(subject, names.iter().map(String::as_str));
-        let near = near.map_or(String::new(), |near| format!("; did you mean `{near}`?"));
-        return Err(Failure::usage(format!(
-            "there is no word and no file `{subject}`{near} (`rfm explain words` lists all words, `rfm explain codes` all \
-             messages)"
-        )));
-    }
     let (path, name) = choose::subject(subject);
+    if !Path::new(path).exists() {
+        if subject == "words" {
+            say!("{}", page::all().trim_end());
+            return Ok(());
+        }
+        if let Some(text) = page::of(subject) {
+            say!("{}", text.trim_end());
+            return Ok(());
+        }
+        let word = subject.trim_start_matches('.');
+        if !word.is_empty() && word.chars().all(is_of_a_word) {
+            return Err(no_such_word(subject));
+        }
+    }
     let program = input::program(shared, path)?;
     if options.show.contains(&Stage::Ast) {
         say!("{}", syntax::print(program.ast()).trim_end());
@@ -88,6 +83,16 @@ pub(super) fn run(shared: &Shared, options: &Explain) -> Result<(), Failure> {
             Ok(())
         }
     }
+}
+
+fn no_such_word(subject: &str) -> Failure {
+    let names = page::names();
+    let near = nearest(subject, names.iter().map(String::as_str));
+    let near = near.map_or(String::new(), |near| format!("; did you mean `{near}`?"));
+    Failure::usage(format!(
+        "there is no word and no file `{subject}`{near} (`rfm explain words` lists all words, `rfm explain codes` all \
+         messages)"
+    ))
 }
 
 /// The first sentence of an explanation, on one line.

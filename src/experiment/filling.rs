@@ -20,13 +20,13 @@ use super::{
     Experiment,
     layers::{Chords, Layers},
     refuse,
+    room::part_in_box,
 };
 use crate::compile::Error;
 use crate::diagnostic::{Code, Diagnostic};
 use crate::field::{Field, Region};
 use crate::geom::Aabb;
 use crate::lower::Scene;
-use crate::solid::Bounds;
 use crate::sph::{Carved, FluidBlock, FluidShape, Obstacle, Particles, Rows, carve, carve_cells, make_room};
 use crate::{Engine, Program, Solid};
 
@@ -98,11 +98,7 @@ pub fn spacing(program: &Program, scene: &Scene, engine: Engine) -> Result<f64, 
 /// other scenes.
 pub(super) fn mass_by_number(scene: &Scene, shape: &Solid) -> Option<f64> {
     let number = scene.fluid.particles.filter(|_| scene.fluid.size_span.is_none())?;
-    let within = match shape.bounds() {
-        Bounds::Within(bounds) => bounds.intersection(&scene.domain),
-        Bounds::Unbounded => scene.domain,
-        Bounds::Empty => return None,
-    };
+    let within = part_in_box(shape, &scene.domain)?;
     let volume = Region { shape, bodies: Vec::new(), within }.volume();
     (volume > 0.0 && volume.is_finite()).then(|| scene.fluid.density * volume / number as f64)
 }

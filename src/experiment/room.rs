@@ -298,6 +298,15 @@ impl Experiment {
     }
 }
 
+/// The box around the part of a shape that lies in a box; `None` if the shape is empty.
+pub(super) fn part_in_box(shape: &Solid, domain: &Aabb) -> Option<Aabb> {
+    match shape.bounds() {
+        Bounds::Within(bounds) => Some(bounds.intersection(domain)),
+        Bounds::Unbounded => Some(*domain),
+        Bounds::Empty => None,
+    }
+}
+
 /// What obstacles take of a fluid's shape.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Taken {
@@ -309,14 +318,7 @@ pub struct Taken {
 
 /// What obstacles take of a fluid's shape within a box; `None` if no sample meets the shape.
 pub fn taken_by_obstacles(fluid: &Solid, obstacles: &[Solid], domain: &Aabb) -> Option<Taken> {
-    let within = match fluid.bounds() {
-        Bounds::Within(bounds) => bounds.intersection(domain),
-        Bounds::Unbounded => *domain,
-        Bounds::Empty => return None,
-    };
-    if is_flat(&within) {
-        return None;
-    }
+    let within = part_in_box(fluid, domain).filter(|within| !is_flat(within))?;
     let is_taken = |p: DVec3| obstacles.iter().any(|obstacle| obstacle.omega(p) >= 0.0);
     // fewer places for many obstacles
     let every = 1 + obstacles.len() / 4;

@@ -3,7 +3,7 @@
 use super::{
     contacts::Contacts,
     core::Core,
-    walls::{Moving, Pushed, Share},
+    walls::{NearMotion, Pushed, Share},
 };
 
 /// Steps for which the work of several walls on a particle is divided once.
@@ -56,9 +56,9 @@ impl<'a> Reaction<'a> {
             });
         }
         let (moving, is_alone) = match boundary.moving_near(at, wall.h) {
-            Moving::Nothing => return,
-            Moving::Alone(moving) => (moving, true),
-            Moving::BesideOthers(moving) => (moving, false),
+            NearMotion::Nothing => return,
+            NearMotion::Alone(moving) => (moving, true),
+            NearMotion::BesideOthers(moving) => (moving, false),
         };
         let roughly = work(moving, pushed.into());
         self.contacts.add_work(i, roughly);

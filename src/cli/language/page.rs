@@ -1,7 +1,5 @@
 //! `rfm explain WORD` and `rfm explain words`: the words of the language and the keys of scenes, from their declarations.
 
-use std::fmt::Write;
-
 use rfm::lower::vocabulary;
 use rfm::sph::Method;
 
@@ -39,7 +37,7 @@ pub(in crate::cli) fn all() -> String {
     }
     for block in keys::blocks() {
         let title = block.map_or("Keys of a scene".to_string(), |block| format!("Keys of `{block}`"));
-        write!(page, "\n## {title}\n\n").expect("texts take all that is written");
+        page += &format!("\n## {title}\n\n");
         let own = Method::default().info().keys;
         let of_methods =
             |key: &&str| own.iter().any(|own| own.name == *key && Some(own.block.name()) == block);

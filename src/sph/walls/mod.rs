@@ -34,7 +34,7 @@ pub(super) use friction::{Friction, WallDrag};
 pub use kernel::WallKernel;
 pub(super) use layers::Wall;
 pub(super) use motion::StepLimits;
-pub(super) use shares::{Moving, Pushed, Share};
+pub(super) use shares::{NearMotion, Pushed, Share};
 pub(super) use symmetric::Symmetric;
 pub(super) use volume::Maps;
 pub use volume::{ChangingShape, RigidPart};

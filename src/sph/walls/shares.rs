@@ -52,7 +52,7 @@ impl From<Pushed> for Share {
 
 /// What moves near a particle.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(in crate::sph) enum Moving {
+pub(in crate::sph) enum NearMotion {
     Nothing,
     /// One obstacle, and no other wall is near.
     Alone(usize),
@@ -139,14 +139,14 @@ impl Boundary {
     }
 
     /// What moves nearer to a place than h, m.
-    pub fn moving_near(&self, p: DVec3, h: f64) -> Moving {
+    pub fn moving_near(&self, p: DVec3, h: f64) -> NearMotion {
         let place = Aabb::new(p, p);
         let is_near = |k: &usize| !self.field(*k).is_far(&place, h);
         let mut moving = (0..self.obstacles.len()).filter(|k| self.obstacles[*k].moves()).filter(is_near);
-        let Some(first) = moving.next() else { return Moving::Nothing };
+        let Some(first) = moving.next() else { return NearMotion::Nothing };
         let in_the_open = self.domain.union(&place.grown(h)) == self.domain;
         let is_alone = in_the_open && !(0..self.obstacles.len()).filter(|k| *k != first).any(|k| is_near(&k));
-        if is_alone { Moving::Alone(first) } else { Moving::BesideOthers(first) }
+        if is_alone { NearMotion::Alone(first) } else { NearMotion::BesideOthers(first) }
     }
 
     /// The faces near a particle, with the numbers of their walls, but for those behind another wall, which has what they
