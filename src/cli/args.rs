@@ -410,8 +410,8 @@ pub(super) struct Run {
     /// Replace the run that the folder holds
     #[arg(long, conflicts_with = "resume")]
     pub force: bool,
-    /// Print what would be run, and run nothing
-    #[arg(long, conflicts_with = "resume")]
+    /// Print what would be run, and run nothing; with --resume, what is left
+    #[arg(long)]
     pub dry_run: bool,
     /// Refuse scenes with more obstacles than this: many parts are better joined with `or` into one solid
     #[arg(long, value_name = "N", default_value_t = 500)]

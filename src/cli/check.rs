@@ -342,15 +342,20 @@ fn remarks(program: &Program, named: &NamedSolid, solid: &Solid, thin: &ThinCell
     }
     let grid = solid.bounds().aabb().and_then(|bounds| Grid::around(&bounds, RESOLUTION).ok());
     if let Some(grid) = grid.filter(|_| thin.count > 0) {
-        let (what, does, help) = match thin.is_wedge {
-            true => (
+        let (what, does, help) = match (thin.is_wedge, thin.cells_needed(&grid)) {
+            (true, _) => (
                 "edges so sharp that",
                 "show them blunt",
                 "more --cells show more of them, and none shows all",
             ),
-            false => {
+            (false, Some(_)) => {
                 ("parts or gaps that", "do not show", "mesh it with more --cells, until `thin_cells` is 0")
             }
+            (false, None) => (
+                "parts or gaps that",
+                "do not show",
+                "to see the place, mesh it alone with a small --box around it",
+            ),
         };
         let message = format!(
             "solid `{}` has {what} {VOLUME_CELLS} cells along its longest side {does}, {}",

@@ -442,6 +442,27 @@ fn a_forecast_needs_no_particles() {
 }
 
 #[test]
+fn a_forecast_of_a_run_that_goes_on_is_of_what_is_left() {
+    let folder = tempfile::tempdir().unwrap();
+    let here = folder.path();
+    std::fs::write(here.join("drop.rfm"), scene("paper", "dt: 1 ms, until: 50 ms, save_every: 10 ms"))
+        .unwrap();
+    run(here, &["out", "--until", "20ms"]).expect(0);
+    let before = names(&here.join("out/frames"));
+    let forecast =
+        |more: &[&str]| run(here, &[&["out", "--dry-run", "--json"], more].concat()).expect(0).json();
+    let (whole, rest) = (forecast(&[]), forecast(&["--resume"]));
+    assert_eq!((&whole["steps"], &whole["frames"]), (&50.into(), &6.into()));
+    assert_eq!((&rest["steps"], &rest["frames"]), (&30.into(), &3.into()));
+    assert_eq!((&rest["particles"], &rest["estimated"]), (&whole["particles"], &false.into()));
+    assert_eq!(names(&here.join("out/frames")), before);
+    let behind = run(here, &["out", "--dry-run", "--resume", "--steps", "5"]).expect(2);
+    assert!(behind.stderr.contains("does not go back"), "{}", behind.stderr);
+    let nothing = run(here, &["other", "--dry-run", "--resume"]).expect(2);
+    assert!(!here.join("other").exists() && !nothing.stderr.is_empty());
+}
+
+#[test]
 fn checkpoints_as_often_as_a_scene_says() {
     let folder = tempfile::tempdir().unwrap();
     let here = folder.path();

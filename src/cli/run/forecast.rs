@@ -13,11 +13,11 @@ use super::super::progress::duration;
 use super::super::stopwatch::Stopwatch;
 use super::super::{Failure, input, output};
 use super::frames::{self, FrameCost};
-use super::goal::Goal;
+use super::goal::{Begin, Goal};
 use super::summary::pass_names;
 use super::{folder, refused, start};
 use rfm::diagnostic::Code;
-use rfm::sph::Simulation;
+use rfm::sph::{Checkpoint, Simulation};
 use rfm::{Error, Experiment};
 
 /// Most particles of a simulation that is started to be measured, and least if they have very many neighbours.
@@ -59,14 +59,20 @@ struct Forecast {
     seconds: f64,
 }
 
-/// Runs a few steps, and prints what all of them would cost.
+/// Runs a few steps, and prints what all of them would cost, or those that are left to a run which goes on.
 pub(super) fn dry_run(
     shared: &Shared,
     options: &Run,
     experiment: &Experiment,
     goal: Goal,
+    resumed: Option<&Checkpoint>,
 ) -> Result<(), Failure> {
-    let estimate = experiment.estimated_particles().map_err(refused)?;
+    let begin = resumed.map_or(Begin::default(), |from| Begin { steps: from.steps, time: from.time });
+    goal.lies_ahead(options, &folder::of(options), begin)?;
+    let estimate = match resumed {
+        Some(checkpoint) => checkpoint.ids.len() as f64,
+        None => experiment.estimated_particles().map_err(refused)?,
+    };
     let most = most_measured(experiment);
     let estimated = estimate > 1.5 * most;
     let smaller;
@@ -76,7 +82,10 @@ pub(super) fn dry_run(
         (&smaller, simulation, seconds)
     } else {
         let begun = Stopwatch::start();
-        let simulation = start(experiment)?.0;
+        let simulation = match resumed {
+            Some(checkpoint) => experiment.resume(checkpoint).map_err(Failure::usage)?,
+            None => start(experiment)?.0,
+        };
         (experiment, simulation, begun.seconds())
     };
     let per_step = seconds_per_step(&mut simulation)?;
@@ -88,8 +97,9 @@ pub(super) fn dry_run(
     let per_step = scale * crowding * per_step;
     let to_start = scale * to_start;
     let time_step = time_step(experiment, measured, &simulation);
-    let steps = goal.steps(time_step);
-    let frames = if options.no_frames { 0 } else { 1 + goal.frames(experiment, time_step) };
+    let steps = goal.steps(begin, time_step);
+    let first = u64::from(resumed.is_none());
+    let frames = if options.no_frames { 0 } else { first + goal.frames(begin, experiment, time_step) };
     let cost = FrameCost::measured(options, measured, &simulation)?.scaled(scale);
     let to_start = to_start + cost.first;
     let disk = frames as f64 * cost.bytes + 2.0 * scale * frames::checkpoint_bytes(&simulation);

@@ -8,6 +8,13 @@ use crate::cli::output::Shown;
 use rfm::Experiment;
 use rfm::sph::{Simulation, short_time};
 
+/// Where a run begins, or goes on: after so many steps, at a time, s.
+#[derive(Clone, Copy, Default)]
+pub(super) struct Begin {
+    pub steps: u64,
+    pub time: f64,
+}
+
 /// The end of a run.
 #[derive(Clone, Copy)]
 pub(super) enum Goal {
@@ -36,11 +43,11 @@ impl Goal {
     }
 
     /// Refuses an end that a flag asks for and that lies behind a run which goes on: it does not go back.
-    pub fn lies_ahead(self, options: &Run, folder: &Path, simulation: &Simulation) -> Result<(), Failure> {
-        let (time, steps) = (short_time(simulation.time()), simulation.steps());
+    pub fn lies_ahead(self, options: &Run, folder: &Path, begin: Begin) -> Result<(), Failure> {
+        let (time, steps) = (short_time(begin.time), begin.steps);
         let asked = match (options.steps, options.until) {
             (Some(asked), _) if asked < steps => format!("--steps {asked}"),
-            (None, Some(asked)) if asked < simulation.time() * (1.0 - 1e-12) => format!("--until {asked}"),
+            (None, Some(asked)) if asked < begin.time * (1.0 - 1e-12) => format!("--until {asked}"),
             _ => return Ok(()),
         };
         Err(Failure::usage(format!(
@@ -81,20 +88,21 @@ impl Goal {
         }
     }
 
-    /// Number of frames after the first, if each step has this length, s.
-    pub fn frames(self, experiment: &Experiment, dt: f64) -> u64 {
-        let end = match self {
-            Self::Steps(steps) => steps as f64 * dt,
-            Self::Time(end) => end,
+    /// Number of frames after that of a beginning, if each step has this length, s.
+    pub fn frames(self, begin: Begin, experiment: &Experiment, dt: f64) -> u64 {
+        let span = match self {
+            Self::Steps(steps) => steps.saturating_sub(begin.steps) as f64 * dt,
+            Self::Time(end) => end - begin.time,
         };
-        (end / experiment.scene().run.save_every).ceil() as u64
+        // a run that goes on arrives at its frames within rounding errors
+        (span / experiment.scene().run.save_every * (1.0 - 1e-12)).ceil() as u64
     }
 
-    /// Number of steps if each has this length, s.
-    pub fn steps(self, dt: f64) -> u64 {
+    /// Number of steps from a beginning, if each has this length, s.
+    pub fn steps(self, begin: Begin, dt: f64) -> u64 {
         match self {
-            Self::Steps(steps) => steps,
-            Self::Time(end) => (end / dt).ceil() as u64,
+            Self::Steps(steps) => steps.saturating_sub(begin.steps),
+            Self::Time(end) => ((end - begin.time) / dt).ceil() as u64,
         }
     }
 }

@@ -29,7 +29,7 @@ use crate::cli::output::Shown;
 use checkpoints::Checkpoints;
 use folder::Hold;
 use frames::Frames;
-use goal::{Goal, Pace};
+use goal::{Begin, Goal, Pace};
 use probes::Probes;
 use rfm::lower::Scene;
 use rfm::sph::{Simulation, short_time};
@@ -48,16 +48,17 @@ pub(super) fn run(shared: &Shared, options: &Run) -> Result<(), Failure> {
     let experiment = experiment(shared, &program, &scene.name)?;
     let fingerprint = experiment.fingerprint();
     let folder = folder::of(options);
+    let read = program.files().asked();
+    let latest = || options.resume.then(|| checkpoints::latest(&folder, &fingerprint, &read)).transpose();
     if options.dry_run {
         let goal = Goal::of(options, &experiment)?;
         frames_fit(options, goal, &experiment)?;
-        return forecast::dry_run(shared, options, &experiment, goal);
+        return forecast::dry_run(shared, options, &experiment, goal, latest()?.as_ref());
     }
     folder::may_be_written(&folder, options, experiment.scene())?;
     // a folder that is not there yet is made only after all that can fail
     let held = folder.exists().then(|| Hold::take(&folder)).transpose()?;
-    let read = program.files().asked();
-    let resumed = options.resume.then(|| checkpoints::latest(&folder, &fingerprint, &read)).transpose()?;
+    let resumed = latest()?;
     let (mut simulation, carved) = match &resumed {
         Some(checkpoint) => (experiment.resume(checkpoint).map_err(Failure::usage)?, 0),
         None => {
@@ -66,7 +67,7 @@ pub(super) fn run(shared: &Shared, options: &Run) -> Result<(), Failure> {
         }
     };
     let goal = Goal::of(options, &experiment)?;
-    goal.lies_ahead(options, &folder, &simulation)?;
+    goal.lies_ahead(options, &folder, Begin { steps: simulation.steps(), time: simulation.time() })?;
     frames_fit(options, goal, &experiment)?;
     let _held = held.map_or_else(|| Hold::take(&folder), Ok)?;
     // another run may have ended in the meantime
@@ -107,7 +108,7 @@ fn obstacles_fit(options: &Run, scene: &Scene) -> Result<(), Failure> {
 
 /// Refuses more frames than there are names for.
 fn frames_fit(options: &Run, goal: Goal, experiment: &Experiment) -> Result<(), Failure> {
-    let frames = goal.frames(experiment, experiment.parameters().time_step);
+    let frames = goal.frames(Begin::default(), experiment, experiment.parameters().time_step);
     if options.no_frames || frames <= Scene::MOST_FRAMES {
         return Ok(());
     }

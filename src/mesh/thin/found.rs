@@ -5,9 +5,6 @@ use glam::DVec3;
 use super::super::Grid;
 use crate::geom::Aabb;
 
-/// Cells along a side beyond which nobody makes a grid: what needs more is an edge, a tip or a touch.
-const FINEST: f64 = 1e5;
-
 /// The cells in which a surface is hidden from the grid.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ThinCells {
@@ -38,10 +35,11 @@ impl ThinCells {
     };
 
     /// The number of cells along the longest side of a grid with which what hides would be two cells thick.
-    /// `None` if nothing hides but wedges, its thickness is not known, or no grid is so fine.
+    /// `None` if nothing hides but wedges, its thickness is not known, or no grid can be so fine.
     pub fn cells_needed(&self, grid: &Grid) -> Option<usize> {
         let needed = (2.0 * grid.bounds().size().max_element() / self.thickness).ceil();
-        (self.count > 0 && !self.is_wedge && needed > 0.0 && needed <= FINEST).then_some(needed as usize)
+        (self.count > 0 && !self.is_wedge && needed > 0.0 && needed <= Grid::MAX_CELLS as f64)
+            .then_some(needed as usize)
     }
 
     /// The cells of two parts of a grid.

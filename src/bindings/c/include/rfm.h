@@ -391,7 +391,8 @@ double rfm_math_atan2(double a, double b);
 // The angle of the point (b, a), with the bits that solids have.
 float rfm_math_atan2f(float a, float b);
 
-// Reads and checks a file, with values for `count` of its params; `params` may be null if there are none.
+// Reads and checks a file, with values for `count` of its params; `params` may be null if there are none. `program` is
+// null after a failure.
 enum RfmStatus rfm_load_file(const char *path,
                              const struct RfmParam *params,
                              size_t count,
@@ -399,7 +400,7 @@ enum RfmStatus rfm_load_file(const char *path,
                              struct RfmError **error);
 
 // Checks a text, with values for `count` of its params. Messages show `name` in place of a path. The text may name no other
-// files, see `rfm_load_text_as`.
+// files, see `rfm_load_text_as`. `program` is null after a failure.
 enum RfmStatus rfm_load_text(const char *text,
                              const char *name,
                              const struct RfmParam *params,
@@ -408,7 +409,7 @@ enum RfmStatus rfm_load_text(const char *text,
                              struct RfmError **error);
 
 // Checks a text that stands for the file with a path, which is not read: the text may name other files in its folder and
-// below, and messages show `path`.
+// below, and messages show `path`. `program` is null after a failure.
 enum RfmStatus rfm_load_text_as(const char *text,
                                 const char *path,
                                 const struct RfmParam *params,
@@ -425,7 +426,7 @@ const char *rfm_solid_name(const struct RfmProgram *program, size_t index);
 // Frees a program; does nothing with null.
 void rfm_program_free(struct RfmProgram *program);
 
-// Compiles a solid of a program.
+// Compiles a solid of a program. `solid` is null after a failure.
 enum RfmStatus rfm_solid(const struct RfmProgram *program,
                          const char *name,
                          struct RfmSolid **solid,
@@ -525,7 +526,8 @@ bool rfm_error_diagnostic(const struct RfmError *error, size_t index, struct Rfm
 // Frees an error object; does nothing with null.
 void rfm_error_free(struct RfmError *error);
 
-// Reads and checks a file, with values for `count` of its params; `params` may be null if there are none.
+// Reads and checks a file, with values for `count` of its params; `params` may be null if there are none. `program` is
+// null after a failure.
 enum RfmStatus rfm_load_file(const char *path,
                              const struct RfmParam *params,
                              size_t count,
@@ -533,7 +535,7 @@ enum RfmStatus rfm_load_file(const char *path,
                              struct RfmError **error);
 
 // Checks a text, with values for `count` of its params. Messages show `name` in place of a path. The text may name no other
-// files, see `rfm_load_text_as`.
+// files, see `rfm_load_text_as`. `program` is null after a failure.
 enum RfmStatus rfm_load_text(const char *text,
                              const char *name,
                              const struct RfmParam *params,
@@ -542,7 +544,7 @@ enum RfmStatus rfm_load_text(const char *text,
                              struct RfmError **error);
 
 // Checks a text that stands for the file with a path, which is not read: the text may name other files in its folder and
-// below, and messages show `path`.
+// below, and messages show `path`. `program` is null after a failure.
 enum RfmStatus rfm_load_text_as(const char *text,
                                 const char *path,
                                 const struct RfmParam *params,
@@ -559,7 +561,7 @@ const char *rfm_solid_name(const struct RfmProgram *program, size_t index);
 // Frees a program; does nothing with null.
 void rfm_program_free(struct RfmProgram *program);
 
-// Compiles a solid of a program.
+// Compiles a solid of a program. `solid` is null after a failure.
 enum RfmStatus rfm_solid(const struct RfmProgram *program,
                          const char *name,
                          struct RfmSolid **solid,

@@ -1,10 +1,11 @@
 //! Files and texts, checked.
 
 use std::ffi::{CString, c_char};
-use std::ptr::null;
+use std::ptr::{null, null_mut};
 
 use library::compile::files_beside;
 use library::diagnostic::Source;
+use library::files::Files;
 use library::lower::Options;
 use library::{Error, Program};
 
@@ -52,7 +53,26 @@ fn checked(source: Source, options: Options) -> Result<RfmProgram, RfmError> {
     Ok(RfmProgram { program, solids })
 }
 
-/// Reads and checks a file, with values for `count` of its params; `params` may be null if there are none.
+/// Checks a text with the name that messages show, which a caller knows as `called`.
+///
+/// # Safety
+/// Both are null, or end with zero bytes; there are `count` params, whose names do so, too.
+// SAFETY: the caller promises what the reads need
+unsafe fn checked_text(
+    (text, name, called): (*const c_char, *const c_char, &str),
+    (params, count): (*const RfmParam, usize),
+    files: impl FnOnce(&str) -> Files,
+) -> Result<RfmProgram, RfmError> {
+    // SAFETY: the caller promises texts
+    let (text, name) = unsafe { (read_text(text, "text")?, read_text(name, called)?) };
+    // SAFETY: the caller promises so many params
+    let mut options = unsafe { options(params, count) }?;
+    options.files = files(name);
+    checked(Source::file(name, text), options)
+}
+
+/// Reads and checks a file, with values for `count` of its params; `params` may be null if there are none. `program` is
+/// null after a failure.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn rfm_load_file(
     path: *const c_char,
@@ -69,15 +89,14 @@ pub unsafe extern "C" fn rfm_load_file(
         options.files = files_beside(path, false);
         let read = std::fs::read(path).and_then(library::compile::text_of);
         let text = read.map_err(|error| Error::File { path: path.to_string(), error })?;
-        // SAFETY: the caller may have it written
-        unsafe { hand_out(program, "program", checked(Source::file(path, text), options)?) }
+        checked(Source::file(path, text), options)
     };
     // SAFETY: null, or the caller's
-    unsafe { attempt(error, load) }
+    unsafe { hand_out((program, "program"), error, load) }
 }
 
 /// Checks a text, with values for `count` of its params. Messages show `name` in place of a path. The text may name no other
-/// files, see `rfm_load_text_as`.
+/// files, see `rfm_load_text_as`. `program` is null after a failure.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn rfm_load_text(
     text: *const c_char,
@@ -87,20 +106,14 @@ pub unsafe extern "C" fn rfm_load_text(
     program: *mut *mut RfmProgram,
     error: *mut *mut RfmError,
 ) -> RfmStatus {
-    let load = || {
-        // SAFETY: the caller promises texts
-        let (text, name) = unsafe { (read_text(text, "text")?, read_text(name, "name")?) };
-        // SAFETY: the caller promises so many params
-        let options = unsafe { options(params, count) }?;
-        // SAFETY: the caller may have it written
-        unsafe { hand_out(program, "program", checked(Source::file(name, text), options)?) }
-    };
+    // SAFETY: the caller promises texts and params
+    let load = || unsafe { checked_text((text, name, "name"), (params, count), |_| Files::default()) };
     // SAFETY: null, or the caller's
-    unsafe { attempt(error, load) }
+    unsafe { hand_out((program, "program"), error, load) }
 }
 
 /// Checks a text that stands for the file with a path, which is not read: the text may name other files in its folder and
-/// below, and messages show `path`.
+/// below, and messages show `path`. `program` is null after a failure.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn rfm_load_text_as(
     text: *const c_char,
@@ -110,31 +123,37 @@ pub unsafe extern "C" fn rfm_load_text_as(
     program: *mut *mut RfmProgram,
     error: *mut *mut RfmError,
 ) -> RfmStatus {
-    let load = || {
-        // SAFETY: the caller promises texts
-        let (text, path) = unsafe { (read_text(text, "text")?, read_text(path, "path")?) };
-        // SAFETY: the caller promises so many params
-        let mut options = unsafe { options(params, count) }?;
-        options.files = files_beside(path, false);
-        // SAFETY: the caller may have it written
-        unsafe { hand_out(program, "program", checked(Source::file(path, text), options)?) }
-    };
+    // SAFETY: the caller promises texts and params
+    let load =
+        || unsafe { checked_text((text, path, "path"), (params, count), |path| files_beside(path, false)) };
     // SAFETY: null, or the caller's
-    unsafe { attempt(error, load) }
+    unsafe { hand_out((program, "program"), error, load) }
 }
 
-/// Gives a new handle to the caller.
+/// Makes a handle and gives it to the caller: null if it could not be made, so that what an earlier call gave is never
+/// taken for the result of this one.
 ///
 /// # Safety
-/// `to` is null or may be written to.
-// SAFETY: the caller promises what the one write needs
-pub unsafe fn hand_out<T>(to: *mut *mut T, name: &str, handle: T) -> Result<(), RfmError> {
-    if to.is_null() {
-        return Err(RfmError::bad(format!("{name} is null")));
-    }
-    // SAFETY: the caller may have it written
-    unsafe { to.write(Box::into_raw(Box::new(handle))) };
-    Ok(())
+/// `to` and `error` are null or may be written to.
+// SAFETY: the caller promises what the writes need
+pub unsafe fn hand_out<T>(
+    (to, name): (*mut *mut T, &str),
+    error: *mut *mut RfmError,
+    make: impl FnOnce() -> Result<T, RfmError>,
+) -> RfmStatus {
+    let work = || {
+        if to.is_null() {
+            return Err(RfmError::bad(format!("{name} is null")));
+        }
+        // SAFETY: the caller may have it written
+        unsafe { to.write(null_mut()) };
+        let handle = Box::into_raw(Box::new(make()?));
+        // SAFETY: the caller may have it written
+        unsafe { to.write(handle) };
+        Ok(())
+    };
+    // SAFETY: null, or the caller's
+    unsafe { attempt(error, work) }
 }
 
 /// The number of solids of a program.

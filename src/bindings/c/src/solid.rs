@@ -82,7 +82,7 @@ pub unsafe fn solid<'a>(handle: *const RfmSolid) -> Result<&'a RfmSolid, RfmErro
     unsafe { handle.as_ref() }.ok_or_else(|| RfmError::bad("solid is null"))
 }
 
-/// Compiles a solid of a program.
+/// Compiles a solid of a program. `solid` is null after a failure.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn rfm_solid(
     program: *const RfmProgram,
@@ -95,12 +95,10 @@ pub unsafe extern "C" fn rfm_solid(
         let file = unsafe { program.as_ref() }.ok_or_else(|| RfmError::bad("program is null"))?;
         // SAFETY: the caller promises a text
         let name = unsafe { read_text(name, "name") }?;
-        let found = RfmSolid::new(file.program.clone(), file.program.solid(name)?, None)?;
-        // SAFETY: the caller may have it written
-        unsafe { hand_out(solid, "solid", found) }
+        RfmSolid::new(file.program.clone(), file.program.solid(name)?, None)
     };
     // SAFETY: null, or the caller's
-    unsafe { attempt(error, compile) }
+    unsafe { hand_out((solid, "solid"), error, compile) }
 }
 
 /// The solid during a stretch of time, s, as a handle of its own: values are those at the end, ranges and bounds hold
@@ -120,12 +118,10 @@ pub unsafe extern "C" fn rfm_solid_between(
         if !(from.is_finite() && to.is_finite()) {
             return Err(RfmError::bad(format!("the times are {from} and {to} s, expected finite numbers")));
         }
-        let found = RfmSolid::new(this.program.clone(), this.solid.between(from, to), this.over)?;
-        // SAFETY: the caller may have it written
-        unsafe { hand_out(then, "then", found) }
+        RfmSolid::new(this.program.clone(), this.solid.between(from, to), this.over)
     };
     // SAFETY: null, or the caller's
-    unsafe { attempt(error, look) }
+    unsafe { hand_out((then, "then"), error, look) }
 }
 
 /// The solid for particles in a box, given by its lowest and its highest corner, three numbers each, as a handle of its
@@ -144,12 +140,10 @@ pub unsafe extern "C" fn rfm_solid_within(
         let this = unsafe { self::solid(solid) }?;
         // SAFETY: null, or three numbers each
         let over = unsafe { read_box(low, high) }?;
-        let found = RfmSolid::new(this.program.clone(), this.solid.clone(), Some(over))?;
-        // SAFETY: the caller may have it written
-        unsafe { hand_out(then, "then", found) }
+        RfmSolid::new(this.program.clone(), this.solid.clone(), Some(over))
     };
     // SAFETY: null, or the caller's
-    unsafe { attempt(error, look) }
+    unsafe { hand_out((then, "then"), error, look) }
 }
 
 /// Whether time occurs in the formula.

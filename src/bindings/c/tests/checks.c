@@ -137,6 +137,8 @@ static void mistakes_become_error_objects(const RfmSolid *pawn) {
     // a text has no folder, unless it stands for a file
     const char *half = "rfm 1\nimport \"pawn.rfm\" as chess\nsolid half = chess.pawn and z <= 1\n";
     CHECK(rfm_load_text(half, "examples/half.rfm", NULL, 0, &program, NULL) == RFM_MISTAKES);
+    // a handle that has been freed is not left where the next one was to come
+    CHECK(program == NULL);
     CHECK(rfm_load_text_as(half, "examples/half.rfm", NULL, 0, &program, NULL) == RFM_OK);
     CHECK(rfm_solid_count(program) == 1 && strcmp(rfm_solid_name(program, 0), "half") == 0);
     rfm_program_free(program);

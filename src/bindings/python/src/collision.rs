@@ -6,13 +6,12 @@ use pyo3::exceptions::{PyTypeError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::sync::PyOnceLock;
 use pyo3::types::{PyList, PyTuple, PyType};
-use rayon::prelude::*;
 use rfm::sph::Rebound;
 use rfm_columns::{Collisions, Column, Found, Obstacle, Particles, Vectors};
 
-use crate::evaluate::{CHUNK, WORTH_RELEASING, WORTH_THREADS};
+use crate::evaluate::WORTH_THREADS;
 use crate::memory::{column, columns};
-use crate::pool::{Threads, run};
+use crate::pool::{Threads, in_ranges};
 
 /// Vectors in the memory of arrays that may be written to.
 struct Given {
@@ -59,17 +58,8 @@ fn look(
     rebound: &Rebound,
     threads: Threads,
 ) -> PyResult<Vec<Found>> {
-    let count = particles.len();
-    let all = || vec![particles.look(0..count, obstacle, rebound)];
-    if count < WORTH_RELEASING {
-        return Ok(all());
-    }
-    if threads.is_one() || count <= CHUNK || (threads == Threads::Auto && count < WORTH_THREADS) {
-        return Ok(py.detach(all));
-    }
-    let part =
-        |chunk: usize| particles.look(chunk * CHUNK..((chunk + 1) * CHUNK).min(count), obstacle, rebound);
-    run(py, threads, || (0..count.div_ceil(CHUNK)).into_par_iter().map(part).collect())
+    let part = |range| particles.look(range, obstacle, rebound);
+    in_ranges(py, threads, particles.len(), WORTH_THREADS, part)
 }
 
 /// An array of shape (n, 3), or three columns.

@@ -2,23 +2,16 @@
 
 use numpy::Element;
 use pyo3::prelude::*;
-use rayon::prelude::*;
 use rfm::Solid;
 use rfm::solid::Chosen;
 use rfm_columns::{Column, Job, Number};
 
 use crate::points::Points;
-use crate::pool::{Threads, pool};
+use crate::pool::{CHUNK, Threads, in_ranges};
 use crate::results::Target;
-
-/// Points that one thread takes at a time.
-pub const CHUNK: usize = 8192;
 
 /// From so many points on, several threads are used if the caller states no number.
 pub const WORTH_THREADS: usize = 4 * CHUNK;
-
-/// Below this many points, Python's lock is kept: to release it takes as long as some points do.
-pub const WORTH_RELEASING: usize = 64;
 
 /// Calls `evaluate` for all points.
 fn over<T: Number + Element, const N: usize>(
@@ -31,21 +24,7 @@ fn over<T: Number + Element, const N: usize>(
     // SAFETY: `points` keeps its arrays, the callers below keep those of the results, and `Target` sees to it
     // that results share no address with the points or with one another
     let job = unsafe { Job::new(points.count, points.columns, results) };
-    let count = job.len();
-    if count < WORTH_RELEASING {
-        job.run(0..count, &evaluate);
-    } else if threads.is_one() || count <= CHUNK || (threads == Threads::Auto && count < WORTH_THREADS) {
-        py.detach(|| job.run(0..count, &evaluate));
-    } else {
-        let pool = pool(py, threads)?;
-        py.detach(|| {
-            pool.install(|| {
-                (0..count.div_ceil(CHUNK)).into_par_iter().for_each(|chunk| {
-                    job.run(chunk * CHUNK..((chunk + 1) * CHUNK).min(count), &evaluate);
-                });
-            });
-        });
-    }
+    in_ranges(py, threads, job.len(), WORTH_THREADS, |range| job.run(range, &evaluate))?;
     Ok(())
 }
 

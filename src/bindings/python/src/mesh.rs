@@ -2,10 +2,10 @@
 
 use std::io::BufWriter;
 use std::path::{Path, PathBuf};
-use std::sync::OnceLock;
+use std::sync::{Arc, OnceLock};
 
 use numpy::{PyArray1, PyArray2, PyArrayMethods};
-use pyo3::exceptions::PyValueError;
+use pyo3::exceptions::{PyKeyboardInterrupt, PyValueError};
 use pyo3::prelude::*;
 use pyo3::sync::PyOnceLock;
 use rfm::Solid;
@@ -18,15 +18,16 @@ use rfm::mesh::{
 use rfm::solid::Bounds;
 
 use crate::error::{not_read, refused};
+use crate::pool::{Threads, Watch, run_watched};
 
-/// A way to make a mesh.
-pub type Mesher = fn(&dyn Field, &Grid) -> Result<Mesh, MeshError>;
+/// A way to make a mesh, ended by Ctrl-C.
+pub type Mesher = fn(&dyn Field, &Grid, &Watch) -> Result<Mesh, MeshError>;
 
 /// The method of a name.
 pub fn mesher(method: &str) -> PyResult<Mesher> {
     match method {
-        "mc" => Ok(|field, grid| marching_cubes(field, grid, &|_| {})),
-        "dc" => Ok(|field, grid| dual_contouring(field, grid, &|_| {})),
+        "mc" => Ok(|field, grid, watch| marching_cubes(field, grid, &|_| watch.look())),
+        "dc" => Ok(|field, grid, watch| dual_contouring(field, grid, &|_| watch.look())),
         _ => Err(PyValueError::new_err(format!("method is {method:?}, expected 'mc' or 'dc'"))),
     }
 }
@@ -55,7 +56,7 @@ pub struct PyMesh {
     mesh: Mesh,
     report: Report,
     /// What it was made of, and in which cells; `None` for an empty solid.
-    made_of: Option<(Solid, Grid)>,
+    made_of: Option<Arc<(Solid, Grid)>>,
     thin_cells: OnceLock<usize>,
     vertices: PyOnceLock<Py<PyAny>>,
     normals: PyOnceLock<Py<PyAny>>,
@@ -73,6 +74,7 @@ impl PyMesh {
         resolution: Resolution,
         mesher: Mesher,
         no_slivers: bool,
+        watch: &Watch,
     ) -> PyResult<Self> {
         let grid = match (domain, solid.bounds()) {
             (Some(domain), _) => Grid::filling(&domain, resolution),
@@ -82,7 +84,7 @@ impl PyMesh {
         };
         let grid = grid.map_err(refused)?;
         let field = solid.surface(*grid.bounds());
-        let mut found = mesher(&*field, &grid).map_err(refused)?;
+        let mut found = mesher(&*field, &grid, watch).map_err(refused)?;
         if no_slivers {
             mesh::remove_slivers(&mut found);
         }
@@ -94,12 +96,16 @@ impl PyMesh {
     ///
     /// # Errors
     /// `RfmError` if there are too many cells.
-    fn count_thin_cells(&self) -> PyResult<usize> {
+    fn count_thin_cells(&self, py: Python<'_>) -> PyResult<usize> {
         if let Some(count) = self.thin_cells.get() {
             return Ok(*count);
         }
-        let Some((solid, grid)) = &self.made_of else { return Ok(0) };
-        let found = mesh::thin_cells(&*solid.surface(*grid.bounds()), grid).map_err(refused)?;
+        let Some(made_of) = self.made_of.clone() else { return Ok(0) };
+        let found = run_watched(py, Threads::Auto, move |_| {
+            let (solid, grid) = &*made_of;
+            mesh::thin_cells(&*solid.surface(*grid.bounds()), grid)
+        })?
+        .map_err(refused)?;
         Ok(*self.thin_cells.get_or_init(|| found.count))
     }
 
@@ -113,7 +119,15 @@ impl PyMesh {
 
     fn checked(mesh: Mesh, report: Report, made_of: Option<(Solid, Grid)>) -> Self {
         let [vertices, normals, triangles] = [PyOnceLock::new(), PyOnceLock::new(), PyOnceLock::new()];
-        Self { mesh, report, made_of, thin_cells: OnceLock::new(), vertices, normals, triangles }
+        Self {
+            mesh,
+            report,
+            made_of: made_of.map(Arc::new),
+            thin_cells: OnceLock::new(),
+            vertices,
+            normals,
+            triangles,
+        }
     }
 }
 
@@ -200,7 +214,7 @@ impl PyMesh {
     /// Number of cells in which parts of the solid hide that are too thin for the mesh.
     #[getter]
     fn thin_cells(&self, py: Python<'_>) -> PyResult<usize> {
-        py.detach(|| self.count_thin_cells())
+        self.count_thin_cells(py)
     }
 
     /// Largest distance of the mesh's vertices from the surface, m. Between them triangles leave a curved surface by up
@@ -244,7 +258,11 @@ impl PyMesh {
             return Err(PyValueError::new_err(format!(".{ending} files are always in metres")));
         }
         if self.mesh.triangles.is_empty() {
-            let reason = match py.detach(|| self.count_thin_cells()).unwrap_or(0) {
+            let hidden = match self.count_thin_cells(py) {
+                Err(error) if error.is_instance_of::<PyKeyboardInterrupt>(py) => return Err(error),
+                counted => counted.unwrap_or(0),
+            };
+            let reason = match hidden {
                 0 => "the solid is empty, or smaller than a cell".to_owned(),
                 n => format!("parts of the solid hide in {n} cells; mesh it with more"),
             };

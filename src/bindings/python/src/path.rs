@@ -1,21 +1,19 @@
 //! Straight paths, and where they meet a solid.
 
+use std::ops::Range;
+
 use numpy::ndarray::Ix2;
 use numpy::{PyArray, PyArray1, PyArrayMethods};
 use pyo3::exceptions::{PyTypeError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::sync::PyOnceLock;
 use pyo3::types::PyType;
-use rayon::prelude::*;
 use rfm::Solid;
 use rfm::field::Entry;
 use rfm::glam::DVec3;
 
 use crate::points::numpy;
-use crate::pool::{Threads, run};
-
-/// Paths that one thread takes at a time.
-const CHUNK: usize = 64;
+use crate::pool::{Threads, in_ranges};
 
 /// From so many paths on, several threads are used if the caller states no number.
 const WORTH_THREADS: usize = 1024;
@@ -36,16 +34,14 @@ pub fn first_entry<'py>(
         return Err(PyValueError::new_err(format!("paths have the shape {shape:?}, expected (…, 3)")));
     }
     let (from, to) = (rows(&both.get_item(0)?)?, rows(&both.get_item(1)?)?);
-    let few = threads == Threads::Auto && from.len() < WORTH_THREADS;
     // nothing is known of a path from or to nowhere
     let met = |(from, to): (&DVec3, &DVec3)| {
         if from.is_finite() && to.is_finite() { solid.first_entry(*from, *to) } else { None }
     };
-    let entries: Vec<Option<Entry>> = if few || threads.is_one() {
-        py.detach(|| from.iter().zip(&to).map(met).collect())
-    } else {
-        run(py, threads, || from.par_iter().zip(&to).with_min_len(CHUNK).map(met).collect())?
+    let some = |range: Range<usize>| -> Vec<Option<Entry>> {
+        from[range.clone()].iter().zip(&to[range]).map(met).collect()
     };
+    let entries = in_ranges(py, threads, from.len(), WORTH_THREADS, some)?.concat();
     let normal = |entry: &Entry| entry.normals.mean().unwrap_or(DVec3::ZERO);
     let part = PyArray1::from_iter(py, entries.iter().map(|e| e.map_or(f64::NAN, |e| e.t)));
     let point = vectors(py, &entries, |entry| entry.point)?.call_method1("reshape", (&shape,))?;

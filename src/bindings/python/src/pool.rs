@@ -6,11 +6,26 @@
 
 use std::collections::BTreeMap;
 use std::num::NonZeroUsize;
+use std::ops::Range;
+use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::mpsc::{RecvTimeoutError, sync_channel};
 use std::sync::{Arc, Mutex, PoisonError};
+use std::time::{Duration, Instant};
 
 use pyo3::exceptions::{PyRuntimeError, PyValueError};
 use pyo3::prelude::*;
+use rayon::prelude::*;
 use rayon::{ThreadPool, ThreadPoolBuilder};
+
+/// Time between looks for Ctrl-C.
+pub const LOOK: Duration = Duration::from_millis(50);
+
+/// Items that one thread takes at a time.
+pub const CHUNK: usize = 8192;
+
+/// Below this many items, Python's lock is kept: to release it takes as long as some items do.
+pub const WORTH_RELEASING: usize = 64;
 
 struct Pools {
     /// The process that the pools belong to; 0 before the first one is made.
@@ -84,4 +99,108 @@ pub fn pool(_py: Python<'_>, threads: Threads) -> PyResult<Arc<ThreadPool>> {
 pub fn run<R: Send>(py: Python<'_>, threads: Threads, work: impl FnOnce() -> R + Send) -> PyResult<R> {
     let pool = pool(py, threads)?;
     Ok(py.detach(|| pool.install(work)))
+}
+
+/// Whether Ctrl-C has been pressed while something ran.
+#[derive(Clone, Default)]
+pub struct Watch(Arc<AtomicBool>);
+
+impl Watch {
+    /// Ends the work if Ctrl-C has been pressed; nobody waits for its result then.
+    pub fn look(&self) {
+        if self.0.load(Ordering::Relaxed) {
+            resume_unwind(Box::new("Ctrl-C"));
+        }
+    }
+}
+
+/// Runs something long on the threads of a pool, with Python's lock released, and returns at once when Ctrl-C is
+/// pressed. The work owns what it needs: it goes on unseen until it next looks at the watch.
+///
+/// # Errors
+/// `KeyboardInterrupt`, or whatever else a handler of signals raises.
+pub fn run_watched<R: Send + 'static>(
+    py: Python<'_>,
+    threads: Threads,
+    work: impl FnOnce(&Watch) -> R + Send + 'static,
+) -> PyResult<R> {
+    let pool = pool(py, threads)?;
+    let watch = Watch::default();
+    let (done, result) = sync_channel(1);
+    // Python's lock is released by lending what is used meanwhile, so that it must be safe to share
+    let result = Mutex::new(result);
+    let wait = || result.lock().unwrap_or_else(PoisonError::into_inner).recv_timeout(LOOK);
+    let watched = watch.clone();
+    pool.spawn(move || {
+        // an error of the send means that nobody waits
+        let _ = done.send(catch_unwind(AssertUnwindSafe(|| work(&watched))));
+    });
+    loop {
+        match py.detach(wait) {
+            Ok(Ok(found)) => return Ok(found),
+            Ok(Err(panic)) => resume_unwind(panic),
+            Err(RecvTimeoutError::Disconnected) => {
+                return Err(PyRuntimeError::new_err("the threads have ended before their work"));
+            }
+            Err(RecvTimeoutError::Timeout) => {}
+        }
+        if let Err(interrupt) = py.check_signals() {
+            watch.0.store(true, Ordering::Relaxed);
+            // what follows gets threads of its own, and these end with their work
+            POOLS
+                .lock()
+                .unwrap_or_else(PoisonError::into_inner)
+                .by_threads
+                .retain(|_, other| !Arc::ptr_eq(other, &pool));
+            return Err(interrupt);
+        }
+    }
+}
+
+/// Does some work for ranges that together are `0..count`, on the caller's thread or, if the work is worth it, on
+/// those of a pool, with Python's lock released and looks for Ctrl-C in between. Returns the results in order.
+///
+/// `worth_threads` is the number of items from which several threads are used if the caller states none.
+///
+/// # Errors
+/// `KeyboardInterrupt`, or whatever else a handler of signals raises; then a part of the work has been done.
+pub fn in_ranges<R: Send>(
+    py: Python<'_>,
+    threads: Threads,
+    count: usize,
+    worth_threads: usize,
+    work: impl Fn(Range<usize>) -> R + Sync,
+) -> PyResult<Vec<R>> {
+    if count < WORTH_RELEASING {
+        return Ok(vec![work(0..count)]);
+    }
+    let alone = threads.is_one() || (threads == Threads::Auto && count < worth_threads);
+    let pool = if alone { None } else { Some(pool(py, threads)?) };
+    let mut results = Vec::new();
+    let (mut begin, mut size) = (0, WORTH_RELEASING);
+    while begin < count {
+        let range = begin..count.min(begin.saturating_add(size));
+        let begun = Instant::now();
+        py.detach(|| match &pool {
+            Some(pool) if range.len() > WORTH_RELEASING => {
+                let chunk = range.len().div_ceil(pool.current_num_threads()).min(CHUNK);
+                let parts = range.len().div_ceil(chunk);
+                let part = |part: usize| {
+                    let from = range.start + part * chunk;
+                    work(from..range.end.min(from + chunk))
+                };
+                pool.install(|| results.par_extend((0..parts).into_par_iter().map(part)));
+            }
+            _ => results.push(work(range.clone())),
+        });
+        begin = range.end;
+        // long enough to cost nothing, short enough for the one who waits
+        match begun.elapsed() {
+            fast if fast < LOOK / 16 => size = size.saturating_mul(8),
+            slow if slow < LOOK / 2 => size = size.saturating_mul(2),
+            _ => {}
+        }
+        py.check_signals()?;
+    }
+    Ok(results)
 }

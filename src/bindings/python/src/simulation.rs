@@ -3,7 +3,7 @@
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, MutexGuard, PoisonError, TryLockError};
-use std::time::{Duration, Instant};
+use std::time::Instant;
 
 use pyo3::exceptions::{PyBufferError, PyRuntimeError, PyValueError};
 use pyo3::prelude::*;
@@ -15,13 +15,10 @@ use rfm::{Engine, Experiment};
 
 use crate::error::{diagnostics, not_read, raised, refused};
 use crate::mesh::write_file;
-use crate::pool::{Threads, run};
+use crate::pool::{LOOK, Threads, run};
 use crate::program::PyProgram;
 use crate::show;
 use crate::state::{self, Lent};
-
-/// Time between looks for Ctrl-C and reports of progress.
-const LOOK: Duration = Duration::from_millis(50);
 
 /// Folder of checkpoints in that of a run; that of `rfm run`, too.
 const CHECKPOINTS: &str = "checkpoints";

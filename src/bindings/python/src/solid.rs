@@ -19,7 +19,7 @@ use crate::evaluate::ask;
 use crate::mesh::PyMesh;
 use crate::path::first_entry;
 use crate::points::aabb;
-use crate::pool::{Threads, run};
+use crate::pool::{Threads, run_watched};
 use crate::program::PyProgram;
 use crate::results::{no_out, several};
 use crate::show;
@@ -463,7 +463,8 @@ impl PySolid {
     #[pyo3(signature = (cells=96, *, threads=Threads::Auto))]
     #[pyo3(text_signature = "($self, cells=96, *, threads=None)")]
     fn volume(&self, py: Python<'_>, cells: usize, threads: Threads) -> PyResult<f64> {
-        run(py, threads, || crate::mesh::volume(&self.solid, cells))?
+        let solid = self.solid.clone();
+        run_watched(py, threads, move |_| crate::mesh::volume(&solid, cells))?
     }
 
     /// A closed triangle mesh of the surface.
@@ -500,7 +501,10 @@ impl PySolid {
         let resolution = cell.map_or(mesh::Resolution::Cells(cells), mesh::Resolution::Spacing);
         let domain = r#box.map(aabb).transpose()?;
         let mesher = crate::mesh::mesher(method)?;
-        run(py, threads, || PyMesh::of(&self.solid, domain, resolution, mesher, no_slivers))?
+        let solid = self.solid.clone();
+        run_watched(py, threads, move |watch| {
+            PyMesh::of(&solid, domain, resolution, mesher, no_slivers, watch)
+        })?
     }
 
     /// ω in a plane.

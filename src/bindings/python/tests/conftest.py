@@ -1,8 +1,12 @@
 """What the tests share: files of the project, and the program `rfm`, whose answers the module must match."""
 
+import contextlib
 import os
 import pathlib
+import signal
 import subprocess
+import threading
+import time
 
 import pytest
 
@@ -31,3 +35,25 @@ def program():
         return subprocess.run([*command, *map(str, arguments)], check=True, capture_output=True, text=True, **options)
 
     return run
+
+
+@pytest.fixture
+def interrupts():
+    """Presses Ctrl-C soon, and expects an end long before the work would end."""
+
+    @contextlib.contextmanager
+    def pressed():
+        # Python's own answer: a process that was started in the background would ignore the signal
+        before = signal.signal(signal.SIGINT, signal.default_int_handler)
+        timer = threading.Timer(0.4, lambda: os.kill(os.getpid(), signal.SIGINT))
+        started = time.monotonic()
+        try:
+            timer.start()
+            with pytest.raises(KeyboardInterrupt):
+                yield
+        finally:
+            timer.cancel()
+            signal.signal(signal.SIGINT, before)
+        assert time.monotonic() - started < 20
+
+    return pressed

