@@ -223,9 +223,13 @@ pub(super) fn of_scenes(
         }
         let spacing = experiment::spacing(program, scene, engine)?;
         let first = usize::from(scene.container.is_some());
+        let container = scene.container.as_ref();
+        let outside = container.map(|c| program.compile(&c.name, c.outside, engine)).transpose()?;
         let mut solids = Vec::new();
         for (k, obstacle) in scene.obstacles.iter().enumerate() {
-            let solid = program.compile(&obstacle.name, obstacle.shape, engine)?.at(0.0);
+            let solid = program.compile(&obstacle.name, obstacle.shape, engine)?;
+            found.extend(out_of_reach((scene, spacing), obstacle, (&solid, outside.as_ref())));
+            let solid = solid.at(0.0);
             let wall = wall_limit(scene, first + k);
             let search = (obstacle.shape, [wall * spacing, spacing], scene.domain);
             found.extend(too_thin((scene, spacing), obstacle, wall, searches.thin_parts(&solid, search)));
@@ -258,6 +262,32 @@ fn in_obstacles(scene: &Scene, fluid: &Solid, obstacles: &[Solid]) -> Option<Dia
     })
 }
 
+/// A warning if no fluid can meet an obstacle.
+fn out_of_reach(
+    (scene, spacing): (&Scene, f64),
+    obstacle: &Obstacle,
+    (solid, outside): (&Solid, Option<&Solid>),
+) -> Option<Diagnostic> {
+    if solid.graph(ProgramKind::Value).0.len() > MOST_OPERATIONS {
+        return None;
+    }
+    let is_out = experiment::is_out_of_reach(solid, outside, &scene.domain, scene.run.until, DEPTH * spacing);
+    is_out.then(|| {
+        let (room, help) = match &scene.container {
+            Some(container) => (
+                format!("the container `{}`", container.name),
+                "where its face lies on the container's, both act on the fluid: let the container reach beyond it",
+            ),
+            None => ("the box".to_owned(), "move it into the box, or make the box larger"),
+        };
+        let message = format!("obstacle `{}` lies outside {room}: no fluid can be in its place", obstacle.name);
+        Diagnostic::warning(Code::OUT_OF_REACH, obstacle.span, message).help(help)
+    })
+}
+
+/// Part of the spacing by which an obstacle may reach into the room and count as outside of it.
+const DEPTH: f64 = 0.5;
+
 /// Obstacles with more operations are not looked at for what they take of the fluid: that would take seconds.
 const MOST_OPERATIONS: usize = 2000;
 
@@ -285,6 +315,9 @@ pub(super) fn of_experiment(experiment: &Experiment, searches: &mut Searches) ->
             .extend(singular(&body.solid, &scene.domain, &jumps).iter().map(|place| subject.singular(place)));
         // the walls of a container have the outside behind them, and its gaps are shown by the fluid's number
         if let Some(obstacle) = obstacle {
+            let outside = scene.container.as_ref().and_then(|_| experiment.bodies().first());
+            let solids = (&body.solid, outside.map(|outside| &outside.solid));
+            found.list.extend(out_of_reach((scene, spacing), obstacle, solids));
             let wall = wall_limit(scene, number);
             let parts =
                 searches.thin_parts(&body.solid, (obstacle.shape, [wall * spacing, spacing], scene.domain));

@@ -339,7 +339,7 @@ pub fn taken_by_obstacles(fluid: &Solid, obstacles: &[Solid], domain: &Aabb) -> 
 }
 
 /// Points in the middles of equal cells that fill a box.
-fn samples(region: &Aabb) -> impl Iterator<Item = DVec3> + use<> {
+pub(super) fn samples(region: &Aabb) -> impl Iterator<Item = DVec3> + use<> {
     let size = region.size();
     let side = size.max_element() / SAMPLES;
     let counts = (size / side).ceil().max(DVec3::ONE);

@@ -1,0 +1,50 @@
+//! Obstacles that no fluid can meet: they lie outside the box, or in the wall of the container.
+
+use super::room::{part_in_box, samples};
+use crate::field::is_flat;
+use crate::geom::Aabb;
+use crate::solid::{ProgramKind, Solid};
+
+/// Boxes that are looked at before it is left open whether an obstacle reaches into the room, and how many
+/// operations of its formula are evaluated for them: some tenths of a second.
+const MOST: (usize, usize) = (200_000, 20_000_000);
+
+/// Whether an obstacle has no place at which fluid could be if it were not there, at any time from 0 to `until`, s. What
+/// reaches into the room by less than `depth`, m, may count as nothing. `outside` is the outside of the container.
+///
+/// True is proven but for that depth. False is said where it takes too long to tell, too.
+pub fn is_out_of_reach(
+    obstacle: &Solid,
+    outside: Option<&Solid>,
+    domain: &Aabb,
+    until: f64,
+    depth: f64,
+) -> bool {
+    let obstacle = obstacle.between(0.0, until);
+    let outside = outside.map(|solid| solid.between(0.0, until));
+    let Some(part) = part_in_box(&obstacle, domain) else { return false };
+    if is_flat(&part) {
+        return true;
+    }
+    // most obstacles are seen at once
+    let is_free = |p| outside.as_ref().is_none_or(|outside| outside.omega(p) < 0.0);
+    if samples(&part).any(|p| obstacle.omega(p) > 0.0 && is_free(p)) {
+        return false;
+    }
+    let middle = domain.grown(-depth);
+    let mut left = vec![part];
+    let operations = obstacle.graph(ProgramKind::Value).0.len();
+    for _ in 0..MOST.0.min(MOST.1 / operations.max(1)) {
+        let Some(place) = left.pop() else { return true };
+        let wall = outside.as_ref().map(|outside| outside.range(&place));
+        if obstacle.range(&place).hi <= 0.0 || wall.is_some_and(|wall| wall.lo >= 0.0) {
+            continue;
+        }
+        if place.size().max_element() > depth {
+            left.extend(place.halves());
+        } else if wall.is_none_or(|wall| wall.hi < 0.0) && middle.intersection(&place) == place {
+            return false; // far from all walls, and the obstacle may be there
+        }
+    }
+    false
+}
