@@ -363,11 +363,12 @@ fn thin(
         () if of_spacing != 1.0 => "less than half of".to_owned(),
         () => "less than".to_owned(),
     };
-    let consequence = match is_load {
-        true => {
+    let consequence = match (is_load, what) {
+        (true, _) => {
             "; loads on it by a fluid on one side are too large, by 5 % at 1.4 times, 15 % at 1, 40 % at 0.7"
         }
-        false => "",
+        (false, "wall") => ", so that fluids on its two sides push one another through it",
+        (false, _) => ", so that less flows through it than should",
     };
     let message = format!(
         "a {what} of obstacle `{}` is {:.2e} m wide at {}: {less} the {spacing:.2e} m between particles{consequence}",

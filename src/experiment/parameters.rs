@@ -8,7 +8,7 @@ use crate::Program;
 use crate::diagnostic::{Code, Diagnostic};
 use crate::ir::Node;
 use crate::lower::{Gravity, Measured, Probe, Scene};
-use crate::sph::{Gradients, Method, Parameters};
+use crate::sph::{Gradients, Method, Parameters, Slip};
 
 /// The length of a simulation's steps, and where it comes from.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -58,6 +58,12 @@ pub(super) fn of_scene(program: &Program, scene: &Scene, mass: f64, typical_spee
         expected_speed: typical_speed,
         method: scene.method,
         slip: scene.slip,
+        sticks: scene
+            .container
+            .iter()
+            .map(|c| c.skin)
+            .chain(scene.obstacles.iter().map(|o| o.skin))
+            .any(|s| s.slip == Slip::No),
         // known once the particles are placed
         fills_vessel: false,
         precision: scene.solver.precision.unwrap_or(method.precision),

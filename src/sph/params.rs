@@ -47,6 +47,9 @@ pub struct Parameters {
     pub method: Method,
     /// How the walls of the box act on a fluid that moves along them. Obstacles have their own.
     pub slip: Slip,
+    /// Whether the fluid sticks to any wall, of the box or of an obstacle; a simulation looks for itself, too. Steps that
+    /// viscosity limits are shorter then.
+    pub sticks: bool,
     /// Coefficient of friction μ of the container's walls: when a particle hits a wall, its speed along the
     /// wall falls by μ times the change of its velocity normal to the wall. Zero: no friction.
     pub wall_friction: f64,
@@ -74,6 +77,7 @@ impl Default for Parameters {
             expected_speed: 7.7,
             method: Paper::default().into(),
             slip: Slip::Free,
+            sticks: false,
             wall_friction: 0.0,
             fills_vessel: false,
             precision: Precision::F64,
@@ -129,7 +133,7 @@ impl Parameters {
             viscosity: self.viscosity,
             surface_tension: self.surface_tension,
             expected_speed: self.expected_speed,
-            slip: self.slip,
+            sticks: self.sticks || self.slip == Slip::No,
         }
     }
 

@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use super::scales::{Scales, Slip};
+use super::scales::Scales;
 
 /// A stage of a step. The variants stand in the order in which a step runs them. Passes that a scene does not
 /// need do not run.
@@ -56,10 +56,7 @@ impl Pass {
 
     /// Why the pass that makes the fluid stick to walls does not run.
     pub(super) fn without_friction(scales: &Scales) -> Option<&'static str> {
-        match scales.slip {
-            Slip::Free => Some("the fluid slips along walls"),
-            Slip::No => Self::without_viscosity(scales),
-        }
+        if scales.sticks { Self::without_viscosity(scales) } else { Some("the fluid slips along walls") }
     }
 
     /// Name of the pass in the output of `rfm explain` and in summaries.

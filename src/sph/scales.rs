@@ -25,8 +25,8 @@ pub struct Scales {
     pub surface_tension: f64,
     /// The greatest speed that is expected, m/s.
     pub expected_speed: f64,
-    /// How the walls of the box act on a fluid that moves along them.
-    pub slip: Slip,
+    /// Whether the fluid sticks to any wall.
+    pub sticks: bool,
 }
 
 impl Scales {

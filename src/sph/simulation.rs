@@ -11,6 +11,7 @@ use glam::DVec3;
 
 use crate::geom::Aabb;
 
+use super::scales::Slip;
 use super::{
     VectorField, VectorOfTime,
     audit::{Audit, Finding},
@@ -61,7 +62,7 @@ impl Simulation {
 
     /// The simulation at an instant: the number of steps taken, and the time, s.
     fn at(
-        parameters: Parameters,
+        mut parameters: Parameters,
         particles: Particles,
         domain: Aabb,
         obstacles: Vec<Obstacle>,
@@ -69,6 +70,7 @@ impl Simulation {
     ) -> Result<Self, SetupError> {
         let (steps, time) = instant.unwrap_or((0, 0.0));
         parameters.validate().map_err(SetupError::Parameter)?;
+        parameters.sticks |= obstacles.iter().any(|obstacle| obstacle.slip == Slip::No);
         let clearance = CLEARANCE * parameters.support_radius;
         let mut boundary = Boundary {
             domain,

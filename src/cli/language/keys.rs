@@ -124,7 +124,12 @@ const TRUTH: Rows = &[
 ];
 
 const PROBE: Rows = &[
-    ("height", "", "", "measures the height of the surface, in m, above a place [x, y], in m"),
+    (
+        "height",
+        "",
+        "",
+        "measures the height of the surface, or of dry ground, in m, above a place [x, y], in m",
+    ),
     ("pressure", "", "", "measures the pressure, in Pa, at a place, in m"),
     ("velocity", "", "", "measures the velocity, in m/s, at a place, in m"),
     ("force", "", "", "measures the force on an obstacle, in N, and its torque, in N·m"),

@@ -69,51 +69,33 @@ pub(super) fn dry_run(
 ) -> Result<(), Failure> {
     let begin = resumed.map_or(Begin::default(), |from| Begin { steps: from.steps, time: from.time });
     goal.lies_ahead(options, &folder::of(options), begin)?;
-    let estimate = match resumed {
-        Some(checkpoint) => checkpoint.ids.len() as f64,
-        None => experiment.estimated_particles().map_err(refused)?,
-    };
-    let most = most_measured(experiment);
-    let estimated = estimate > 1.5 * most;
-    let smaller;
-    let (measured, mut simulation, to_start) = if estimated {
-        let (coarse, simulation, seconds) = coarser(shared, experiment, most)?;
-        smaller = coarse;
-        (&smaller, simulation, seconds)
-    } else {
-        let begun = Stopwatch::start();
-        let simulation = match resumed {
-            Some(checkpoint) => experiment.resume(checkpoint).map_err(Failure::usage)?,
-            None => start(experiment)?.0,
-        };
-        (experiment, simulation, begun.seconds())
-    };
-    let per_step = seconds_per_step(&mut simulation)?;
+    let mut trial = Trial::start(shared, experiment, resumed)?;
+    let per_step = seconds_per_step(&mut trial.simulation)?;
+    let Trial { ref simulation, particles, .. } = trial;
+    let measured = trial.coarser.as_ref().unwrap_or(experiment);
     let (stats, parameters) = (simulation.stats(), experiment.parameters());
-    let particles = if estimated { estimate.round() as usize } else { stats.particles };
     let scale = particles as f64 / stats.particles as f64;
     let reach = within_reach(experiment);
     let crowding = reach.min(particles as f64) / reach.min(stats.particles as f64);
     let per_step = scale * crowding * per_step;
-    let to_start = scale * to_start;
-    let time_step = time_step(experiment, measured, &simulation);
+    let time_step = time_step(experiment, measured, simulation);
     let steps = goal.steps(begin, time_step);
     let first = u64::from(resumed.is_none());
     let frames = if options.no_frames { 0 } else { first + goal.frames(begin, experiment, time_step) };
-    let cost = FrameCost::measured(options, measured, &simulation)?.scaled(scale);
-    let to_start = to_start + cost.first;
-    let disk = frames as f64 * cost.bytes + 2.0 * scale * frames::checkpoint_bytes(&simulation);
+    let cost = FrameCost::measured(options, measured, simulation)?.scaled(scale);
+    let to_start = scale * trial.to_start + cost.first;
+    let disk = frames as f64 * cost.bytes + 2.0 * scale * frames::checkpoint_bytes(simulation);
     let forecast = Forecast {
         schema: 1,
         particles,
-        estimated,
+        estimated: trial.coarser.is_some(),
         spacing: parameters.spacing(),
         neighbours_per_particle: stats.neighbours_per_particle,
         time_step,
         time_step_reason: experiment.time_step().reason,
         steps,
-        passes: pass_names(&simulation),
-        bytes: memory(&simulation, scale),
+        passes: pass_names(simulation),
+        bytes: memory(simulation, scale),
         bytes_free: free_memory(),
         frames,
         disk_bytes: disk,
@@ -129,6 +111,43 @@ pub(super) fn dry_run(
     }
     print(&forecast);
     Ok(())
+}
+
+/// A simulation whose steps are timed: the scene's, or one with fewer particles.
+struct Trial {
+    /// The scene with fewer particles, if the scene has too many.
+    coarser: Option<Experiment>,
+    simulation: Simulation,
+    /// The seconds that the start took.
+    to_start: f64,
+    /// The number of particles of the scene.
+    particles: usize,
+}
+
+impl Trial {
+    fn start(
+        shared: &Shared,
+        experiment: &Experiment,
+        resumed: Option<&Checkpoint>,
+    ) -> Result<Self, Failure> {
+        let estimate = match resumed {
+            Some(checkpoint) => checkpoint.ids.len() as f64,
+            None => experiment.estimated_particles().map_err(refused)?,
+        };
+        let most = most_measured(experiment);
+        if estimate > 1.5 * most {
+            let (coarser, simulation, to_start) = coarser(shared, experiment, most)?;
+            let particles = estimate.round() as usize;
+            return Ok(Self { coarser: Some(coarser), simulation, to_start, particles });
+        }
+        let begun = Stopwatch::start();
+        let simulation = match resumed {
+            Some(checkpoint) => experiment.resume(checkpoint).map_err(Failure::usage)?,
+            None => start(experiment)?.0,
+        };
+        let particles = simulation.particles().len();
+        Ok(Self { coarser: None, simulation, to_start: begun.seconds(), particles })
+    }
 }
 
 /// The scene with few large particles, started, and the seconds that the start took. With particles too large for what the

@@ -63,9 +63,17 @@ impl<'a> Lowering<'a> {
         let run = self.run(&block);
         let container_name = container.iter().map(|c| &c.name[..]);
         let bodies: Vec<&str> = container_name.chain(obstacles.iter().map(|o| &o.name[..])).collect();
-        let picture = self.picture(&block, &bodies);
-        let probes = match (&domain, &fluid, &run) {
-            (Some((domain, ..)), Some(FluidAndMethod { fluid, .. }), Some(Run { until, .. })) => {
+        // a body that is missing has mistakes that were reported
+        let stated = block.blocks("obstacle").count() + block.blocks("container").count();
+        let all_bodies = (bodies.len() == stated).then_some(bodies);
+        let picture = all_bodies.as_ref().and_then(|bodies| self.picture(&block, bodies));
+        let probes = match (&domain, &fluid, &run, all_bodies) {
+            (
+                Some((domain, ..)),
+                Some(FluidAndMethod { fluid, .. }),
+                Some(Run { until, .. }),
+                Some(bodies),
+            ) => {
                 let around = Surroundings { domain: *domain, bodies, fluid: &fluid.name, until: *until };
                 self.probes(&block, &around)
             }

@@ -8,6 +8,7 @@ use glam::DVec3;
 
 use super::crossings::{ALL_HALVINGS, Lattice, MOST_POINTS, halved};
 use crate::geom::Aabb;
+use crate::solid::Bounds;
 use crate::solid::construction::Solid;
 
 /// What walls and gaps are looked for.
@@ -67,7 +68,7 @@ const LEAST_EXTENT: f64 = 2.0;
 
 impl Solid {
     /// The thinnest wall and the thinnest gap of the solid that are thinner than a length each, and extend over twice this
-    /// length at least; `None` where there is none. Solids without bounds, and very large ones, are not looked at.
+    /// length at least; `None` where there is none. Very large solids are not looked at, nor are those without bounds in a box without them.
     ///
     /// A fluid may be in a finite box. Both faces of a gap must lie in it, and beyond both faces of a wall there must be as
     /// much room in it as a gap needs. The search takes its operations from a budget; if they are not left there it finds
@@ -83,8 +84,10 @@ impl Solid {
         let (..=MOST_OPERATIONS, Some(left)) = (operations, budget.checked_sub(SIGNS * operations)) else {
             return [None; 2];
         };
-        let Some(bounds) = self.bounds().aabb().map(|bounds| bounds.intersection(&search.within)) else {
-            return [None; 2];
+        let bounds = match self.bounds() {
+            Bounds::Within(bounds) => bounds.intersection(&search.within),
+            Bounds::Unbounded if search.within.size().is_finite() => search.within,
+            Bounds::Unbounded | Bounds::Empty => return [None; 2],
         };
         if bounds.is_empty() {
             return [None; 2];

@@ -153,6 +153,9 @@ impl Columns {
         for p in position.iter() {
             (min, max) = (min.min(p), max.max(p));
         }
+        if position.is_empty() {
+            (min, max) = (DVec3::ZERO, DVec3::ZERO);
+        }
         let limit = (CELLS_PER_PARTICLE * position.len()).max(4096) as f64;
         // Columns are wider by the error that rounding may add to a distance.
         let slack = 1e-9 * radius + 8.0 * f64::EPSILON * min.abs().max(max.abs()).max_element();

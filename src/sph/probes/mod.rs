@@ -35,8 +35,8 @@ const MOST_COVERED: f64 = 0.9;
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Probe {
     /// Height z of the fluid's surface above (x, y), m: the highest place at which half of the kernel's part
-    /// outside walls is filled. Drops and spray do not count. A dry place has the z of the box's floor, and one beside the box
-    /// has NaN.
+    /// outside walls is filled. Drops and spray do not count. A dry place has the z of its ground, and one beside the box, or
+    /// in bodies from the floor to the ceiling, has NaN.
     Height {
         /// x of the place, m.
         x: f64,
@@ -237,7 +237,31 @@ fn height(core: &Core, x: f64, y: f64) -> f64 {
         }
         above = z;
     }
-    min.z
+    ground(core, x, y)
+}
+
+/// Height of the lowest place above (x, y) that lies in no body, m; NaN if there is none.
+fn ground(core: &Core, x: f64, y: f64) -> f64 {
+    let Aabb { min, max } = core.boundary.domain;
+    let is_free = |z: f64| core.boundary.fields().all(|body| body.omega(DVec3::new(x, y, z)) <= 0.0);
+    let step = 0.25 * core.parameters.spacing();
+    let mut below = min.z;
+    if is_free(below) {
+        return below;
+    }
+    while below < max.z {
+        let z = (below + step).min(max.z);
+        if is_free(z) {
+            let (mut taken, mut free) = (below, z);
+            for _ in 0..30 {
+                let middle = 0.5 * (taken + free);
+                if is_free(middle) { free = middle } else { taken = middle }
+            }
+            return free;
+        }
+        below = z;
+    }
+    f64::NAN
 }
 
 /// The particles around a place.

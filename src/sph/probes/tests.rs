@@ -135,6 +135,18 @@ fn the_height_of_a_column_is_found_in_its_middle_and_at_walls_and_spray_is_not()
 }
 
 #[test]
+fn a_dry_place_has_the_height_of_its_ground() {
+    let slab = Obstacle::at_rest(floor(0.31), 1.0);
+    let core = state_around(weakly(), Particles::default(), bowl(), vec![slab]);
+    assert!((height(&core, 0.5, 0.25) - 0.31).abs() < 1e-9);
+    let full = Obstacle::at_rest(floor(100.0), 1.0);
+    let core = state_around(weakly(), Particles::default(), bowl(), vec![full]);
+    assert!(height(&core, 0.5, 0.25).is_nan());
+    let core = state(weakly(), Particles::default(), bowl());
+    assert_eq!(height(&core, 0.5, 0.25), bowl().min.z);
+}
+
+#[test]
 fn a_falling_block_carries_its_mass_through_a_plane() {
     let (from, to) = (DVec3::new(0.1, 0.1, 0.3), DVec3::new(0.4, 0.3, 0.8));
     for method in [Method::from(Paper::default()), weakly()] {

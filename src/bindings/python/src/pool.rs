@@ -57,6 +57,9 @@ impl<'py> FromPyObject<'_, 'py> for Threads {
     type Error = PyErr;
 
     fn extract(threads: Borrowed<'_, 'py, PyAny>) -> PyResult<Self> {
+        if threads.is_none() {
+            return Ok(Self::Auto);
+        }
         let count: i64 = threads.extract()?;
         let positive = usize::try_from(count).ok().and_then(NonZeroUsize::new);
         let count = positive

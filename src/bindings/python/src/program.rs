@@ -7,7 +7,7 @@ use std::sync::{Mutex, PoisonError};
 use pyo3::exceptions::{PyKeyError, PyTypeError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::sync::PyOnceLock;
-use pyo3::types::{PyDict, PyString, PyTuple, PyType};
+use pyo3::types::{PyBytes, PyDict, PyString, PyTuple, PyType};
 use rfm::compile::{files_beside, text_of};
 use rfm::diagnostic::{Source, SourceId};
 use rfm::files::Files;
@@ -117,6 +117,10 @@ impl PyProgram {
     fn check(py: Python<'_>, source: Source, params: Vec<Given>) -> PyResult<Self> {
         // a text has no folder, and names no other files
         let files = if &*source.name == TEXT { Files::default() } else { files_beside(&*source.name, false) };
+        Self::check_with(py, source, params, files)
+    }
+
+    fn check_with(py: Python<'_>, source: Source, params: Vec<Given>, files: Files) -> PyResult<Self> {
         let dimensions =
             params.iter().filter_map(|param| Some((param.name.clone(), param.dimension?))).collect();
         let overrides = params.into_iter().map(|param| (param.name, param.value)).collect();
@@ -285,20 +289,26 @@ impl PyProgram {
         let params: Vec<(&str, f64)> =
             self.program.overrides().iter().map(|(name, value)| (&**name, *value)).collect();
         let name = self.source().map_or(TEXT, |source| &source.name);
-        Ok((rebuild, (name, self.text(), params).into_pyobject(py)?))
+        // with the files that it read, so that it is the same wherever and whenever it is made again
+        let files = self.program.files();
+        let read = |name: String| files.read(&name).ok().map(|bytes| (name, PyBytes::new(py, &bytes)));
+        let files: Vec<_> = files.asked().into_iter().filter_map(read).collect();
+        Ok((rebuild, (name, self.text(), params, files).into_pyobject(py)?))
     }
 }
 
-/// A program from its name, text and params; for pickles.
+/// A program from its name, text, params and the files that it reads; for pickles.
 #[pyfunction(name = "_program")]
 pub fn program_from_pickle(
     py: Python<'_>,
     name: String,
     text: String,
     params: Vec<(String, f64)>,
+    files: Vec<(String, Bound<'_, PyBytes>)>,
 ) -> PyResult<PyProgram> {
     let params = params.into_iter().map(|(name, value)| Given { name, value, dimension: None });
-    PyProgram::check(py, Source::file(name, text), params.collect())
+    let files = Files::from_memory(files.iter().map(|(name, bytes)| (name, bytes.as_bytes())));
+    PyProgram::check_with(py, Source::file(name, text), params.collect(), files)
 }
 
 /// A solid of a program by its name, at a stretch of time and for particles in a box; for pickles.

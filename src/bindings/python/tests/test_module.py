@@ -205,6 +205,26 @@ def test_notebooks_see_the_viewer(pawn):
     assert pages(nothing._repr_html_()) == ([], []) and "empty" in nothing._repr_html_()
 
 
+def test_pickles_keep_the_files_that_a_program_reads(tmp_path, monkeypatch):
+    (tmp_path / "parts").mkdir()
+    (tmp_path / "parts" / "ball.rfm").write_text("rfm 1\nparam r = 50 cm\nsolid ball = sphere(r)\n")
+    (tmp_path / "main.rfm").write_text('rfm 1\nimport "parts/ball.rfm" as parts\nsolid s = parts.ball\n')
+    monkeypatch.chdir(tmp_path)
+    program = rfm.load("main.rfm")
+    kept = pickle.dumps(program)
+    (tmp_path / "parts" / "ball.rfm").write_text("rfm 1\nsolid ball = sphere(1)\n")
+    monkeypatch.chdir("/")
+    again = pickle.loads(kept)
+    assert again["s"](0, 0, 0) == program["s"](0, 0, 0) == 0.25
+    assert pickle.loads(pickle.dumps(again))["s"](0, 0, 0) == 0.25
+
+
+def test_no_number_of_threads_is_that_of_the_default(pawn):
+    points = POINTS[:100]
+    assert np.array_equal(pawn.omega(points, threads=None), pawn.omega(points))
+    assert pawn.program.scene(threads=None).time == 0.0
+
+
 def test_pickles_keep_source_params_and_time():
     program = rfm.load(EXAMPLES / "gate.rfm", width=0.5)
     again = pickle.loads(pickle.dumps(program))
