@@ -288,7 +288,8 @@ fn out_of_reach(
 /// Part of the spacing by which an obstacle may reach into the room and count as outside of it.
 const DEPTH: f64 = 0.5;
 
-/// Obstacles with more operations are not looked at for what they take of the fluid: that would take seconds.
+/// Obstacles with more operations are not looked at for what they take of the fluid, and for whether it can meet
+/// them: that would take seconds.
 const MOST_OPERATIONS: usize = 2000;
 
 /// Part of a fluid's shape in obstacles from which on it is told of.

@@ -325,10 +325,11 @@ probe. The state itself is whole, because it comes from a checkpoint, so all tha
 `particles.pvd` goes without those frames, and a mean over a table with a hole is not the mean of the run. The message says
 what is missing. `--force` in place of --resume computes the run anew.";
 OUT_OF_REACH = "W0519":
-"An obstacle has no place where fluid could ever be: it lies outside the box, or in the wall of the container. If its face lies on
-that of the container, as a lid on a vessel, then both walls are there, and each has its part in what the fluid feels: a lid that
-moves takes the fluid along at half its speed, because the container's wall at the same place is at rest. Let the container reach
-beyond the obstacle, so that this alone is the wall there.";
+"An obstacle has no place where fluid could ever be: it lies outside the box, or in the wall of the container. If its
+face lies on that of the box or of the container, as a lid on a vessel, then both walls are there, and each has its part
+in what the fluid feels: a lid that moves takes a fluid that sticks to both along at half its speed, because the other
+wall at the same place is at rest. Let the box or the container reach beyond the obstacle, so that this alone is the
+wall there.";
 OBSTACLE_FILLS_BOX = "E0502":
 "The obstacle covers every place where fluid was to be put: nothing is left to simulate.";
 }

@@ -9,10 +9,10 @@ use crate::solid::{ProgramKind, Solid};
 /// operations of its formula are evaluated for them: some tenths of a second.
 const MOST: (usize, usize) = (200_000, 20_000_000);
 
-/// Whether an obstacle has no place at which fluid could be if it were not there, at any time from 0 to `until`, s. What
-/// reaches into the room by less than `depth`, m, may count as nothing. `outside` is the outside of the container.
+/// Whether an obstacle has no place at which fluid could be if it were not there, at any time from 0 to `until`, s.
+/// What reaches into the room by less than `depth`, m, may count as nothing. `outside` is the outside of the container.
 ///
-/// True is proven but for that depth. False is said where it takes too long to tell, too.
+/// False is said where it takes too long to tell, too, and inside a container that moves.
 pub fn is_out_of_reach(
     obstacle: &Solid,
     outside: Option<&Solid>,
@@ -26,6 +26,9 @@ pub fn is_out_of_reach(
     if is_flat(&part) {
         return true;
     }
+    if outside.as_ref().is_some_and(|outside| outside.moves()) {
+        return false;
+    }
     // most obstacles are seen at once
     let is_free = |p| outside.as_ref().is_none_or(|outside| outside.omega(p) < 0.0);
     if samples(&part).any(|p| obstacle.omega(p) > 0.0 && is_free(p)) {
@@ -33,17 +36,23 @@ pub fn is_out_of_reach(
     }
     let middle = domain.grown(-depth);
     let mut left = vec![part];
-    let operations = obstacle.graph(ProgramKind::Value).0.len();
+    let operations = |solid: &Solid| solid.graph(ProgramKind::Value).0.len();
+    let operations = operations(&obstacle) + outside.as_ref().map_or(0, operations);
     for _ in 0..MOST.0.min(MOST.1 / operations.max(1)) {
         let Some(place) = left.pop() else { return true };
+        if obstacle.range(&place).hi <= 0.0 {
+            continue;
+        }
         let wall = outside.as_ref().map(|outside| outside.range(&place));
-        if obstacle.range(&place).hi <= 0.0 || wall.is_some_and(|wall| wall.lo >= 0.0) {
+        if wall.is_some_and(|wall| wall.lo >= 0.0) {
             continue;
         }
         if place.size().max_element() > depth {
             left.extend(place.halves());
-        } else if wall.is_none_or(|wall| wall.hi < 0.0) && middle.intersection(&place) == place {
-            return false; // far from all walls, and the obstacle may be there
+        } else if middle.intersection(&place) == place
+            && (wall.is_none_or(|wall| wall.hi < 0.0) || is_free(place.centre()))
+        {
+            return false; // away from all walls, and the obstacle may be there
         }
     }
     false

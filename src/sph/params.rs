@@ -47,8 +47,8 @@ pub struct Parameters {
     pub method: Method,
     /// How the walls of the box act on a fluid that moves along them. Obstacles have their own.
     pub slip: Slip,
-    /// Whether the fluid sticks to any wall, of the box or of an obstacle; a simulation looks for itself, too. Steps that
-    /// viscosity limits are shorter then.
+    /// Whether the fluid sticks to any wall, of the box or of an obstacle; a simulation looks for itself, too. Steps
+    /// that viscosity limits are shorter then, except with the paper's method.
     pub sticks: bool,
     /// Coefficient of friction μ of the container's walls: when a particle hits a wall, its speed along the
     /// wall falls by μ times the change of its velocity normal to the wall. Zero: no friction.

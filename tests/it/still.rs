@@ -192,7 +192,7 @@ scene rest {
 
 #[test]
 fn honey_that_sticks_to_its_vessel_stops() {
-    // beside walls viscosity takes the longest step: with twice that, and with that where nothing sticks, speeds grow
+    // with the longest step that viscosity allows away from walls, speeds grow beside them
     for (walls, sticky) in [
         ("box { min: [-0.3, -0.3, 0], max: [0.3, 0.3, 0.2] }", "walls: no_slip"),
         (

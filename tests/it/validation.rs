@@ -188,8 +188,8 @@ fn a_turning_cylinder_takes_the_fluid_along() {
     velocity_within("couette", &[("particles", 2413.0)], 0.03);
 }
 
-/// Velocities in a cavity below a lid at the Reynolds number 100, from the tables of Ghia, Ghia and Shin (1982): x, z, the axis
-/// and the component of the velocity along it, in parts of the side and of the lid's speed.
+/// Velocities in a cavity below a lid at the Reynolds number 100, from the tables of Ghia, Ghia and Shin (1982): x, z,
+/// the axis and the component of the velocity along it, in parts of the side and of the lid's speed.
 const CAVITY: [(f64, f64, usize, f64); 15] = [
     (0.5, 0.1016, 0, -0.06434),
     (0.5, 0.1719, 0, -0.1015),

@@ -282,10 +282,7 @@ pub(super) fn hidden(thin: &ThinCells, grid: &Grid) -> String {
         Some(needed) => format!("{what} {:.2e} thick: about {needed} cells would show it", thin.thickness),
         None if thin.is_wedge => format!("{what} that ends in a sharp edge"),
         None if thin.thickness.is_finite() => {
-            format!(
-                "{what} {:.0e} thick, as at a sharp edge: no grid around all of it shows that",
-                thin.thickness
-            )
+            format!("{what} {:.0e} thick, which no grid around all of it shows", thin.thickness)
         }
         None => format!("{what} of unknown thickness"),
     };

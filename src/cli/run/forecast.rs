@@ -88,7 +88,7 @@ pub(super) fn dry_run(
     let forecast = Forecast {
         schema: 1,
         particles,
-        estimated: trial.coarser.is_some(),
+        estimated: trial.coarser.is_some() && resumed.is_none(),
         spacing: parameters.spacing(),
         neighbours_per_particle: stats.neighbours_per_particle,
         time_step,
@@ -138,6 +138,8 @@ impl Trial {
         if estimate > 1.5 * most {
             let (coarser, simulation, to_start) = coarser(shared, experiment, most)?;
             let particles = estimate.round() as usize;
+            // a run that goes on places nothing
+            let to_start = if resumed.is_some() { 0.0 } else { to_start };
             return Ok(Self { coarser: Some(coarser), simulation, to_start, particles });
         }
         let begun = Stopwatch::start();

@@ -90,12 +90,14 @@ impl Goal {
 
     /// Number of frames after that of a beginning, if each step has this length, s.
     pub fn frames(self, begin: Begin, experiment: &Experiment, dt: f64) -> u64 {
-        let span = match self {
-            Self::Steps(steps) => steps.saturating_sub(begin.steps) as f64 * dt,
-            Self::Time(end) => end - begin.time,
+        let end = match self {
+            Self::Steps(steps) => begin.time + steps.saturating_sub(begin.steps) as f64 * dt,
+            Self::Time(end) => end,
         };
-        // a run that goes on arrives at its frames within rounding errors
-        (span / experiment.scene().run.save_every * (1.0 - 1e-12)).ceil() as u64
+        // runs arrive at their frames within rounding errors
+        let every = experiment.scene().run.save_every;
+        let all = (end / every * (1.0 - 1e-12)).ceil();
+        (all - (begin.time / every * (1.0 + 1e-12)).floor()).max(0.0) as u64
     }
 
     /// Number of steps from a beginning, if each has this length, s.

@@ -68,7 +68,8 @@ const LEAST_EXTENT: f64 = 2.0;
 
 impl Solid {
     /// The thinnest wall and the thinnest gap of the solid that are thinner than a length each, and extend over twice this
-    /// length at least; `None` where there is none. Very large solids are not looked at, nor are those without bounds in a box without them.
+    /// length at least; `None` where there is none. Very large solids are not looked at, nor are those
+    /// without bounds in a box without them.
     ///
     /// A fluid may be in a finite box. Both faces of a gap must lie in it, and beyond both faces of a wall there must be as
     /// much room in it as a gap needs. The search takes its operations from a budget; if they are not left there it finds

@@ -41,11 +41,11 @@ pub(in crate::sph) trait Numerics: Sync {
 
     /// The longest step, s, that viscosity allows: (h/2)²/24ν, and half of it where the fluid sticks to walls.
     ///
-    /// Forces along lines resist a compression three times as strongly as a shear: deep in the fluid steps of 1.2
-    /// (support of 2.4 spacings) to 1.5 times that are stable (3 spacings). A wall adds up to 2ν·18/h²/(1 − m) to the rate
-    /// of a particle beside it, and divides what its neighbours add by 1 − m: by a half at a wall and by a quarter
-    /// in an edge, which has half as many neighbours. That makes 0.57 of the stable step; in a box 0.8 was found, in a
-    /// cylinder 0.7.
+    /// Forces along lines resist a compression three times as strongly as a shear. Away from walls, flows burst with
+    /// steps beyond 1.2 times (h/2)²/24ν (support of 2.4 spacings), or 1.5 times (3 spacings). A wall adds up to
+    /// 2ν·18/h²/(1 − m) to the rate of a particle beside it, and divides what its neighbours add by 1 − m: by a half
+    /// at a wall and by a quarter in an edge, where there are fewer neighbours. Together they allow 0.57 of
+    /// (h/2)²/24ν; flows were found to burst beyond 0.8 of it in a box, and 0.7 in a cylinder.
     fn viscous_dt(&self, scales: &Scales) -> f64 {
         let part = if scales.sticks { 48.0 } else { 24.0 };
         (0.5 * scales.support_radius).powi(2) * scales.rest_density / (part * scales.viscosity)

@@ -35,8 +35,8 @@ const MOST_COVERED: f64 = 0.9;
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Probe {
     /// Height z of the fluid's surface above (x, y), m: the highest place at which half of the kernel's part
-    /// outside walls is filled. Drops and spray do not count. A dry place has the z of its ground, and one beside the box, or
-    /// in bodies from the floor to the ceiling, has NaN.
+    /// outside walls is filled. Drops and spray do not count. A dry place has the z of its ground, and one beside the
+    /// box, or in bodies from the floor to the ceiling, has NaN.
     Height {
         /// x of the place, m.
         x: f64,

@@ -434,7 +434,7 @@ enum RfmStatus rfm_solid(const struct RfmProgram *program,
 
 // The solid during a stretch of time, s, as a handle of its own: values are those at the end, ranges and bounds hold
 // for all of it, and paths of `rfm_first_entry` pass from its beginning to its end. Nothing is compiled again. For a
-// single time, both ends are equal.
+// single time, both ends are equal. `then` is null after a failure, and is not the place of the handle given.
 enum RfmStatus rfm_solid_between(const struct RfmSolid *solid,
                                  double from,
                                  double to,
@@ -569,7 +569,7 @@ enum RfmStatus rfm_solid(const struct RfmProgram *program,
 
 // The solid during a stretch of time, s, as a handle of its own: values are those at the end, ranges and bounds hold
 // for all of it, and paths of `rfm_first_entry` pass from its beginning to its end. Nothing is compiled again. For a
-// single time, both ends are equal.
+// single time, both ends are equal. `then` is null after a failure, and is not the place of the handle given.
 enum RfmStatus rfm_solid_between(const struct RfmSolid *solid,
                                  double from,
                                  double to,

@@ -103,7 +103,7 @@ pub unsafe extern "C" fn rfm_solid(
 
 /// The solid during a stretch of time, s, as a handle of its own: values are those at the end, ranges and bounds hold
 /// for all of it, and paths of `rfm_first_entry` pass from its beginning to its end. Nothing is compiled again. For a
-/// single time, both ends are equal.
+/// single time, both ends are equal. `then` is null after a failure, and is not the place of the handle given.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn rfm_solid_between(
     solid: *const RfmSolid,

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use std::sync::{Arc, OnceLock};
 
 use numpy::{PyArray1, PyArray2, PyArrayMethods};
-use pyo3::exceptions::{PyKeyboardInterrupt, PyValueError};
+use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::sync::PyOnceLock;
 use rfm::Solid;
@@ -259,7 +259,8 @@ impl PyMesh {
         }
         if self.mesh.triangles.is_empty() {
             let hidden = match self.count_thin_cells(py) {
-                Err(error) if error.is_instance_of::<PyKeyboardInterrupt>(py) => return Err(error),
+                // what is no refusal of the mesher comes from a signal
+                Err(error) if !error.is_instance_of::<PyValueError>(py) => return Err(error),
                 counted => counted.unwrap_or(0),
             };
             let reason = match hidden {

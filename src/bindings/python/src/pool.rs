@@ -148,6 +148,7 @@ pub fn run_watched<R: Send + 'static>(
             Err(RecvTimeoutError::Timeout) => {}
         }
         if let Err(interrupt) = py.check_signals() {
+            // meshes look at it; a volume and a count of thin cells go on unseen to their end
             watch.0.store(true, Ordering::Relaxed);
             // what follows gets threads of its own, and these end with their work
             POOLS
@@ -183,26 +184,33 @@ pub fn in_ranges<R: Send>(
     let (mut begin, mut size) = (0, WORTH_RELEASING);
     while begin < count {
         let range = begin..count.min(begin.saturating_add(size));
-        let begun = Instant::now();
-        py.detach(|| match &pool {
-            Some(pool) if range.len() > WORTH_RELEASING => {
-                let chunk = range.len().div_ceil(pool.current_num_threads()).min(CHUNK);
-                let parts = range.len().div_ceil(chunk);
-                let part = |part: usize| {
-                    let from = range.start + part * chunk;
-                    work(from..range.end.min(from + chunk))
-                };
-                pool.install(|| results.par_extend((0..parts).into_par_iter().map(part)));
+        let mut spent = Duration::ZERO;
+        // the time until Python's lock is had again says nothing of the work
+        py.detach(|| {
+            let begun = Instant::now();
+            match &pool {
+                Some(pool) if range.len() > WORTH_RELEASING => {
+                    let chunk =
+                        range.len().div_ceil(4 * pool.current_num_threads()).clamp(WORTH_RELEASING, CHUNK);
+                    let parts = range.len().div_ceil(chunk);
+                    let part = |part: usize| {
+                        let from = range.start + part * chunk;
+                        work(from..range.end.min(from + chunk))
+                    };
+                    pool.install(|| results.par_extend((0..parts).into_par_iter().map(part)));
+                }
+                _ => results.push(work(range.clone())),
             }
-            _ => results.push(work(range.clone())),
+            spent = begun.elapsed();
         });
         begin = range.end;
         // long enough to cost nothing, short enough for the one who waits
-        match begun.elapsed() {
-            fast if fast < LOOK / 16 => size = size.saturating_mul(8),
-            slow if slow < LOOK / 2 => size = size.saturating_mul(2),
-            _ => {}
-        }
+        size = match spent {
+            spent if spent < LOOK / 16 => size.saturating_mul(8),
+            spent if spent < LOOK / 2 => size.saturating_mul(2),
+            spent if spent > 2 * LOOK => (size / 4).max(WORTH_RELEASING),
+            _ => size,
+        };
         py.check_signals()?;
     }
     Ok(results)
