@@ -171,15 +171,16 @@ static void corners_and_many_parts(void) {
         "rfm 1\nsolid posts = any i in 0..40: cylinder(0.01, 0.7).move([0.1 + 0.02*i, 0.5, -0.2])\n"
         "solid both = posts or not box([0, 0, 0], [1, 1, 1])";
     RfmProgram *program = NULL;
-    RfmSolid *both = NULL, *near = NULL;
+    RfmSolid *both = NULL, *near = NULL, *none = NULL;
     RfmCollisions found;
     const double low[3] = {0, 0, 0}, high[3] = {1, 1, 1};
     CHECK(rfm_load_text(text, "posts", NULL, 0, &program, NULL) == RFM_OK);
     CHECK(rfm_solid(program, "both", &both, NULL) == RFM_OK);
     CHECK(rfm_solid_within(both, low, high, &near, NULL) == RFM_OK);
-    CHECK(rfm_solid_within(both, high, low, &near, NULL) == RFM_BAD_ARGUMENT);
-    CHECK(rfm_solid_within(both, NULL, high, &near, NULL) == RFM_BAD_ARGUMENT);
-    CHECK(rfm_solid_within(NULL, low, high, &near, NULL) == RFM_BAD_ARGUMENT);
+    none = near;
+    CHECK(rfm_solid_within(both, high, low, &none, NULL) == RFM_BAD_ARGUMENT && none == NULL);
+    CHECK(rfm_solid_within(both, NULL, high, &none, NULL) == RFM_BAD_ARGUMENT);
+    CHECK(rfm_solid_within(NULL, low, high, &none, NULL) == RFM_BAD_ARGUMENT);
     double x[3][3] = {{-0.001, -0.002, 1.0005}, {0.5, 0.495, 0.3}, {0.5, 0.3, 0.3}};
     double v[3][3] = {{-2, -2, 2}, {0, 3, 0}, {1, 1, 1}};
     RfmVectors places = {&x[0][0], &x[0][1], &x[0][2], sizeof x[0]};
