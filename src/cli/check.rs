@@ -13,7 +13,7 @@ use super::mesh::hidden;
 use super::{choose, input, lints, output, section};
 use crate::cli::output::{Shown, significant};
 use rfm::diagnostic::{Code, Diagnostic, Diagnostics};
-use rfm::geom::Aabb;
+use rfm::geom::{Aabb, to_thousandths};
 use rfm::glam::DVec3;
 use rfm::interval::Interval;
 use rfm::ir::{Axis, Magnitudes};
@@ -367,17 +367,37 @@ fn remarks(program: &Program, named: &NamedSolid, solid: &Solid, thin: &ThinCell
     found
 }
 
+/// Whether ω is proven to be positive far away on all sides, as a distance is that is negative inside.
+fn is_all_but_a_part(solid: &Solid) -> bool {
+    [1.0, 1e2, 1e4].into_iter().any(|near: f64| {
+        let far = 1e3 * near;
+        if solid.range(&Aabb::new(DVec3::splat(-near), DVec3::splat(near))).lo >= 0.0 {
+            return false;
+        }
+        DVec3::AXES.into_iter().flat_map(|axis| [axis, -axis]).all(|side| {
+            let others = (DVec3::ONE - side.abs()) * far;
+            let (a, b) = (near * side - others, far * side + others);
+            solid.range(&Aabb::new(a.min(b), a.max(b))).lo > 0.0
+        })
+    })
+}
+
 /// A warning that says which operand of a solid was not found to end, and where.
 fn unbounded(program: &Program, named: &NamedSolid, solid: &Solid) -> Diagnostic {
     let why = solid.unbounded();
     let sides = why.as_ref().map_or(String::new(), Unbounded::direction);
     let message = format!("solid `{}` could not be proven to end {sides}", named.name);
     let ends_but_along_z = why.as_ref().is_some_and(|why| why.sides == ["-z", "+z"]);
-    let help = match ends_but_along_z && !program.module().graph.uses(named.node, Axis::Z) {
-        true => {
+    let is_profile = ends_but_along_z && !program.module().graph.uses(named.node, Axis::Z);
+    let help = match () {
+        () if is_profile => {
             "it is a profile, the same at every z: `.extrude(z0, z1)` or `.revolve()` makes a solid of it"
         }
-        false => "intersect it with a box, or mesh it with --box",
+        () if is_all_but_a_part(solid) => {
+            "ω is positive inside, and this one is positive everywhere far away: of a distance that is negative inside, \
+             write `… <= 0`"
+        }
+        () => "intersect it with a box, or mesh it with --box",
     };
     let warning = Diagnostic::warning(Code::UNBOUNDED_SOLID, named.span, message).help(help);
     let operand = why.filter(|why| !why.is_whole).and_then(|why| why.operand);
@@ -426,7 +446,10 @@ fn measure(solid: &Solid, file: &str) -> Result<(Facts, ThinCells), Failure> {
     };
     facts.bounds = Some(Box3::of(bounds));
     let surface = solid.surface(bounds.grown(0.1 * bounds.size().max_element()));
-    let grid = Grid::around(bounds, RESOLUTION).map_err(Failure::usage)?;
+    let grid = Grid::around(bounds, RESOLUTION).map_err(|error| {
+        let place = to_thousandths(bounds.centre());
+        Failure::usage(format!("cannot divide the room around `{}`, at {place}: {error}", solid.name()))
+    })?;
     let thin = if knows_ranges(solid, bounds) {
         Some(mesh::thin_cells(&*surface, &grid).unwrap_or(ThinCells::NONE))
     } else {

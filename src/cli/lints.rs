@@ -2,14 +2,15 @@
 //! told of them once a text rests, and a run tells of those that its fluid would meet.
 
 use super::failure::note;
-use rfm::diagnostic::{Code, Diagnostic, Diagnostics, Span};
+use rfm::diagnostic::{Code, Diagnostic, Diagnostics, Severity, Span};
+use rfm::experiment::{self, Body};
 use rfm::geom::{Aabb, to_thousandths};
 use rfm::glam::DVec3;
 use rfm::ir::Node;
 use rfm::lower::{Measured, NamedSolid, Obstacle, Scene};
 use rfm::solid::{Break, Breakage, ProgramKind, ThinPart, Uneven};
 use rfm::syntax::ast::Item;
-use rfm::{Engine, Error, Experiment, Program, Solid, experiment};
+use rfm::{Engine, Error, Experiment, Program, Solid};
 
 /// What all solids and scenes of a file share.
 pub(super) struct Searches {
@@ -218,35 +219,75 @@ pub(super) fn of_scenes(
 ) -> Result<Vec<Diagnostic>, Error> {
     let mut found = Vec::new();
     for scene in &program.module().scenes {
-        if scene.obstacles.is_empty() || scene.obstacles.len() > MOST_OBSTACLES {
+        if scene.obstacles.len() > MOST_OBSTACLES {
             continue;
         }
-        let spacing = experiment::spacing(program, scene, engine)?;
-        let first = usize::from(scene.container.is_some());
-        let container = scene.container.as_ref();
-        let outside = container.map(|c| program.compile(&c.name, c.outside, engine)).transpose()?;
-        let mut solids = Vec::new();
-        for (k, obstacle) in scene.obstacles.iter().enumerate() {
-            let solid = program.compile(&obstacle.name, obstacle.shape, engine)?;
-            found.extend(out_of_reach((scene, spacing), obstacle, (&solid, outside.as_ref())));
-            let solid = solid.at(0.0);
-            let wall = wall_limit(scene, first + k);
+        let experiment = match Experiment::new(program, &scene.name, engine) {
+            Ok(experiment) => experiment,
+            Err(Error::Diagnostics(refusal)) => {
+                // of tolerances the solids tell
+                found.extend(refusal.list.into_iter().filter(|refusal| refusal.code != Code::TOLERANCE));
+                continue;
+            }
+            Err(other) => return Err(other),
+        };
+        let spacing = experiment.parameters().spacing();
+        let (outside, obstacles) = experiment
+            .bodies()
+            .split_at(usize::from(scene.container.is_some()).min(experiment.bodies().len()));
+        let outside = outside.first().map(|body| &body.solid);
+        for (k, (obstacle, body)) in scene.obstacles.iter().zip(obstacles).enumerate() {
+            found.extend(out_of_reach((scene, spacing), obstacle, (&body.solid, outside)));
+            let wall = wall_limit(scene, usize::from(outside.is_some()) + k);
             let search = (obstacle.shape, [wall * spacing, spacing], scene.domain);
-            found.extend(too_thin((scene, spacing), obstacle, wall, searches.thin_parts(&solid, search)));
-            solids.push(solid);
+            found.extend(too_thin(
+                (scene, spacing),
+                obstacle,
+                wall,
+                searches.thin_parts(&body.solid.at(0.0), search),
+            ));
         }
-        let fluid = program.compile(&scene.fluid.name, scene.fluid.shape, engine)?.at(0.0);
-        found.extend(in_obstacles(scene, &fluid, &solids));
+        found.extend(of_fluid(&experiment));
     }
     Ok(found)
 }
 
+/// What there is to say of the place of a fluid before any of its particles is placed: it has no room, or lies outside of the box,
+/// or in obstacles.
+fn of_fluid(experiment: &Experiment) -> Vec<Diagnostic> {
+    let operations = |body: &Body| body.solid.graph(ProgramKind::Value).0.len();
+    if experiment.bodies().iter().map(operations).sum::<usize>() > MOST_OPERATIONS {
+        return Vec::new();
+    }
+    let mut found = experiment.foreseen();
+    if found.iter().all(|diagnostic| diagnostic.severity != Severity::Error) {
+        let scene = experiment.scene();
+        let solids: Vec<Solid> = experiment.bodies().iter().map(|body| body.solid.at(0.0)).collect();
+        found.extend(in_obstacles(scene, &experiment.fluid().at(0.0), &solids));
+    }
+    found
+}
+
 /// A warning if a large part of the fluid's shape lies in obstacles, and an error if nothing of it is left. Where obstacles stand
 /// in a fluid that is drawn as if they were not there, as posts in a tank do, they take less.
-fn in_obstacles(scene: &Scene, fluid: &Solid, obstacles: &[Solid]) -> Option<Diagnostic> {
-    let operations = |solid: &Solid| solid.graph(ProgramKind::Value).0.len();
-    if obstacles.iter().map(operations).sum::<usize>() > MOST_OPERATIONS {
-        return None;
+fn in_obstacles(scene: &Scene, fluid: &Solid, bodies: &[Solid]) -> Option<Diagnostic> {
+    let (container, obstacles) = bodies.split_at(usize::from(scene.container.is_some()).min(bodies.len()));
+    if let Some(taken) =
+        experiment::taken_by_obstacles(fluid, container, &scene.domain).filter(|_| !container.is_empty())
+    {
+        if taken.is_all {
+            return Some(experiment::outside_the_container(scene));
+        }
+        if taken.part > MUCH {
+            let part = 100.0 * taken.part;
+            let message = format!(
+                "{part:.0} % of the fluid's shape lies outside of the container, where no particle is placed"
+            );
+            return Some(
+                Diagnostic::warning(Code::FLUID_IN_OBSTACLE, scene.fluid.shape_span, message)
+                    .help("a container is the room that the fluid may fill, not its walls"),
+            );
+        }
     }
     let taken = experiment::taken_by_obstacles(fluid, obstacles, &scene.domain)?;
     let (span, help) = (scene.fluid.shape_span, "move the shape of the fluid out of the obstacles");
@@ -336,6 +377,9 @@ const THIN_WALL: f64 = 0.5;
 /// reach beyond it, where nothing presses back: with still water on one side loads are 5 % too large at 1.4 spacings.
 const LOADED_WALL: f64 = 1.5;
 
+/// Walls and gaps as wide as this part of the limit are wide enough.
+const ALMOST: f64 = 0.999;
+
 /// Scenes with more obstacles are not looked at.
 const MOST_OBSTACLES: usize = 50;
 
@@ -348,7 +392,7 @@ fn too_thin(
 ) -> impl Iterator<Item = Diagnostic> {
     [(wall, "wall", of_wall), (gap, "gap", 1.0)]
         .into_iter()
-        .filter_map(move |(part, what, of_spacing)| Some(thin(scene, obstacle, &part?, (what, of_spacing))))
+        .filter_map(move |(part, what, of_spacing)| thin(scene, obstacle, &part?, (what, of_spacing)))
 }
 
 fn thin(
@@ -356,8 +400,12 @@ fn thin(
     obstacle: &Obstacle,
     part: &ThinPart,
     (what, of_spacing): (&str, f64),
-) -> Diagnostic {
+) -> Option<Diagnostic> {
     let spacings = part.thickness / spacing;
+    // of a search that ends a little below the limit
+    if spacings > ALMOST * of_spacing {
+        return None;
+    }
     let is_load = what == "wall" && spacings >= THIN_WALL;
     let less = match () {
         () if is_load => format!("{spacings:.1} times"),
@@ -378,12 +426,19 @@ fn thin(
         point(part.at)
     );
     // so that it is shown
-    let needed = part.thickness / of_spacing;
+    let needed = rounded_down(part.thickness / of_spacing);
     let number = scene.fluid.particles.map_or_else(String::new, |n| {
         format!(", that of {:.1e} particles,", n as f64 * (spacing / needed).powi(3))
     });
     let help = format!("a spacing of {needed:.1e} m{number} is small enough; or make the {what} wider");
-    Diagnostic::warning(Code::THIN_FOR_PARTICLES, obstacle.span, message).help(help)
+    Some(Diagnostic::warning(Code::THIN_FOR_PARTICLES, obstacle.span, message).help(help))
+}
+
+/// A length, m, rounded down to two digits.
+fn rounded_down(length: f64) -> f64 {
+    let unit = 10_f64.powf(length.log10().floor() - 1.0);
+    // an exact number of units may lie a rounding error below it
+    (length / unit * (1.0 + 1e-9)).floor() * unit
 }
 
 /// The part of the spacing below which a wall of a body, by its number, is told of.

@@ -42,11 +42,13 @@ mod values;
 mod view;
 
 use std::ffi::OsString;
+use std::path::Path;
 use std::process::ExitCode;
 
 use clap::FromArgMatches;
 use clap::error::{ContextKind, ContextValue};
 use rfm::diagnostic::{is_hidden, printable};
+use rfm::lower::vocabulary;
 
 use failure::{Failure, note};
 
@@ -70,16 +72,51 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>) -> ExitCode {
             }
             // clap reports help and version as errors; printing them fails only if nobody reads
             let _ = error.print();
-            if let Some(ContextValue::String(word)) = error.get(ContextKind::InvalidSubcommand)
-                && let Some(command) = elsewhere(word)
-            {
-                note(format!("`rfm {command}` does that"));
+            if let Some(hint) = hint(&error) {
+                note(hint);
             }
             return ExitCode::from(if error.use_stderr() { 2 } else { 0 });
         }
     };
     outlive_size_limits();
     command(arguments).map_or_else(Failure::report, |()| ExitCode::SUCCESS)
+}
+
+/// What there is to say to arguments that are none, beyond a similar flag.
+fn hint(error: &clap::Error) -> Option<String> {
+    let text = |kind| match error.get(kind) {
+        Some(ContextValue::String(text)) => Some(text.as_str()),
+        _ => None,
+    };
+    if let Some(word) = text(ContextKind::InvalidSubcommand) {
+        if Path::new(word).extension().is_some_and(|ending| ending == "rfm") {
+            let commands = format!("`rfm check {word}` lists its solids, `rfm run {word}` runs its scene");
+            return Some(format!("a command comes first: {commands}"));
+        }
+        return elsewhere(word).map(|command| format!("`rfm {command}` does that"));
+    }
+    let argument = text(ContextKind::InvalidArg)?;
+    if let Some(value) = text(ContextKind::InvalidValue) {
+        let has_unit =
+            value.starts_with(|c: char| c.is_ascii_digit()) && value.ends_with(char::is_alphabetic);
+        return match argument.split(' ').next()? {
+            "--cells" if has_unit => {
+                Some(format!("--cells counts cells; how large they are is `--cell {value}`"))
+            }
+            "--what" if ["omega", "ω", "w", "f"].contains(&value) => Some("ω is `--what value`".into()),
+            _ => None,
+        };
+    }
+    if argument.parse::<f64>().is_ok() {
+        return Some("the numbers of a point are joined by commas, as in `--at 1,2,3`".into());
+    }
+    let key = argument.strip_prefix("--")?.replace('-', "_");
+    vocabulary::is_key(&key).then(|| {
+        format!(
+            "`{key}` is a key of scenes: to set it from here let it be a param of the file, as in \
+             `param p = …` and `{key}: p`, and write `-D p=…`"
+        )
+    })
 }
 
 /// The command that does what one of this name does in other programs; `None` if the name is not known from there.

@@ -1,5 +1,5 @@
 //! Output: files, and lines and documents on standard output. A file is written under a temporary name beside
-//! its target and then renamed, so it is whole or not there.
+//! its target and then renamed, so it is whole or not there. Devices and pipes are written as they stand.
 
 use std::borrow::Cow;
 use std::cell::RefCell;
@@ -28,6 +28,13 @@ pub(super) fn write(path: &Path, fill: impl FnOnce(&mut dyn Write) -> io::Result
     if path.is_dir() {
         return Err(Failure::usage(format!("cannot write `{}`: it is a folder", path.shown())));
     }
+    if is_stream(path) {
+        let mut stream = BufWriter::new(File::options().write(true).open(path).map_err(failed)?);
+        return fill(&mut stream).and_then(|()| stream.flush()).map_err(failed);
+    }
+    // a link stays a link
+    let linked = path.is_symlink().then(|| path.canonicalize().ok()).flatten();
+    let path = linked.as_deref().unwrap_or(path);
     let folder = match path.parent() {
         Some(folder) if !folder.as_os_str().is_empty() => folder,
         _ => Path::new("."),
@@ -51,6 +58,11 @@ pub(super) fn write(path: &Path, fill: impl FnOnce(&mut dyn Write) -> io::Result
     Ok(())
 }
 
+/// Whether something else than a file is there, which a file must not replace: a device (`/dev/null`) or a pipe.
+fn is_stream(path: &Path) -> bool {
+    path.metadata().is_ok_and(|there| !there.is_file())
+}
+
 /// Lets another program write a file: `fill` gets the path of a temporary one, which then takes the place of the file.
 pub(super) fn through(path: &Path, fill: impl FnOnce(&Path) -> Result<(), Failure>) -> Result<(), Failure> {
     let failed = |error: io::Error| Failure::usage(format!("cannot write `{}`: {error}", path.shown()));
@@ -58,6 +70,10 @@ pub(super) fn through(path: &Path, fill: impl FnOnce(&Path) -> Result<(), Failur
     if path.is_dir() || !folder.is_dir() {
         // says what is wrong
         return write(path, |_| Ok(()));
+    }
+    if is_stream(path) {
+        // films are written by programs that look at the ending of a name, and go back to the beginning
+        return Err(failed(io::Error::other("it is no file")));
     }
     let name = path.file_name().unwrap_or_default().to_string_lossy();
     let ending = path.extension().map(|ending| format!(".{}", ending.to_string_lossy())).unwrap_or_default();

@@ -116,6 +116,17 @@ pub(super) fn half_towards_eye(plane: &Plane, camera: &Camera) -> Cut {
     half(axis, plane.value, axis.dot(camera.towards_eye()) < 0.0)
 }
 
+/// How a body is drawn that a plane opens, or leaves as it is, or takes away.
+pub(super) fn opened_by(cut: Cut, mesh: &Mesh) -> Drawn {
+    let beyond = mesh.positions.iter().map(|p| cut.beyond(*p));
+    let (least, most) = beyond.fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), x| (a.min(x), b.max(x)));
+    match () {
+        () if most <= 0.0 => Drawn::Whole,
+        () if least >= 0.0 => Drawn::Hidden,
+        () => Drawn::Open(cut),
+    }
+}
+
 /// How a body is drawn without hiding much of the fluid, for which the samples stand: whole, without its front half, or
 /// not at all.
 pub(super) fn out_of_the_way(camera: &Camera, name: &str, mesh: &Mesh, samples: &[DVec3]) -> Drawn {

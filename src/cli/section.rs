@@ -171,13 +171,15 @@ fn plot_sheet(
     }
     let all: Vec<Diagnostic> =
         all.into_iter().flat_map(|(_, _, seen)| seen).filter_map(|seen| seen.warning).collect();
-    // a sheet may show a solid where it is not, as long as it shows it somewhere
+    // a sheet of several solids may show one where it is not, as long as it shows it somewhere
     let missed = |warning: &Diagnostic| warning.code == Code::NO_SECTION;
     let is_nowhere = |solid: Span| {
         all.iter().filter(|other| missed(other) && other.primary.span == solid).count() == planes.len()
     };
-    let warnings =
-        all.iter().filter(|warning| !missed(warning) || is_nowhere(warning.primary.span)).cloned().collect();
+    let warnings = all
+        .iter()
+        .filter(|warning| !missed(warning) || solids.len() == 1 || is_nowhere(warning.primary.span));
+    let warnings = warnings.cloned().collect();
     Ok(warnings)
 }
 

@@ -256,6 +256,13 @@ about an axis has an edge on it: draw it beyond the axis, which hides that edge.
 
     rfm 1
     solid can = polygon([[-0.1, 0], [0.5, 0], [0.5, 1], [-0.1, 1]]).revolve()";
+REVERSED_CHAIN = "W0421":
+"`a <= e <= b` is the layer between a and b, as (e − a)·(b − e), whichever of them is greater. Where a is greater than b no
+place fulfils both comparisons, so the ends are likely exchanged.
+
+    rfm 1
+    param low = 2 in 0 .. 5
+    solid slab = low <= z <= 1 and x^2 + y^2 <= 1";
 FLUID_IN_OBSTACLE = "W0501":
 "Part of the fluid's shape lies inside an obstacle or outside the box. Those particles are carved off before the
 run starts. `rfm check` and editors tell of it where obstacles take more than a quarter of the shape.";
@@ -330,6 +337,10 @@ face lies on that of the box or of the container, as a lid on a vessel, then bot
 in what the fluid feels: a lid that moves takes a fluid that sticks to both along at half its speed, because the other
 wall at the same place is at rest. Let the box or the container reach beyond the obstacle, so that this alone is the
 wall there.";
+SLOW_SOUND = "W0520":
+"`sound_speed` is stated, and the fluid may become faster than a fifth of it. A weakly compressible fluid changes its density
+by about the square of its speed over that of sound: 1 % at a tenth, 5 % at more than a fifth. Beyond, it is a gas, and what is
+found is not that of a liquid. Left out, the speed of sound is ten times the greatest expected speed.";
 OBSTACLE_FILLS_BOX = "E0502":
 "The obstacle covers every place where fluid was to be put: nothing is left to simulate.";
 }

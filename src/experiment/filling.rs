@@ -20,7 +20,7 @@ use super::{
     Experiment,
     layers::{Chords, Layers},
     refuse,
-    room::part_in_box,
+    room::{part_in_box, quick_fields},
 };
 use crate::compile::Error;
 use crate::diagnostic::{Code, Diagnostic};
@@ -116,7 +116,8 @@ impl Experiment {
         if fluid.particles.is_some() && fluid.size_span.is_some() {
             return as_stated();
         }
-        let bodies = self.bodies.iter().map(|body| &body.solid as &dyn Field).collect();
+        let quick = quick_fields(self.bodies.iter().map(|body| &body.solid), within);
+        let bodies = quick.iter().map(|field| &**field as &dyn Field).collect();
         let volume = Region { shape: &self.fluid, bodies, within }.volume();
         let is_measured = volume > 0.0 && volume.is_finite();
         if !is_measured {

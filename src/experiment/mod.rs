@@ -49,7 +49,7 @@ pub use mean::Mean;
 pub use out_of_reach::is_out_of_reach;
 pub use parameters::TimeStep;
 pub use probes::{probe_column, probe_of};
-pub use room::{Taken, taken_by_obstacles};
+pub use room::{Taken, outside_the_container, taken_by_obstacles};
 
 /// A scene, compiled and checked: all that a simulation needs besides its particles.
 pub struct Experiment {
@@ -92,6 +92,10 @@ impl Experiment {
         let mut parameters = parameters::of_scene(&program, &scene, mass, typical_speed);
         let (time_step, too_long) = parameters::time_step(&scene, &parameters);
         parameters.time_step = time_step.seconds;
+        let (h, spacing) = (parameters.support_radius, parameters.spacing());
+        if scene.fluid.support_radius.is_some() && h < spacing {
+            return Err(refuse(&program, too_small_a_support(&scene, h, spacing)));
+        }
         parameters.validate().map_err(|error| refuse(&program, unfit(&scene, typical_speed, &error)))?;
         let bodies = bodies::of_parts(&program, &scene, &parameters, engine, parts)?;
         for body in &bodies {
@@ -100,6 +104,7 @@ impl Experiment {
             }
         }
         let warnings = too_long.into_iter().chain(parameters::stirring(&scene, &parameters));
+        let warnings = warnings.chain(parameters::slow_sound(&scene, &parameters));
         let warnings = warnings.chain(parameters::many_steps(&scene, &parameters));
         let warnings = warnings.chain(parameters::drag(&scene, &parameters, &bodies));
         let warnings = warnings.chain(probes::in_bodies(&scene, &bodies, parameters.spacing())).collect();
@@ -270,6 +275,16 @@ fn unfit(scene: &Scene, typical_speed: f64, error: &ParameterError) -> Diagnosti
     }
     let message = format!("the fluid's figures do not fit together: {error}");
     Diagnostic::error(Code::OUT_OF_RANGE, scene.fluid.shape_span, message)
+}
+
+/// The message for kernels that do not reach from particle to particle.
+fn too_small_a_support(scene: &Scene, h: f64, spacing: f64) -> Diagnostic {
+    let message = format!(
+        "`support_radius` is {h:.2e} m, and particles are {spacing:.2e} m apart: none has a neighbour"
+    );
+    let usual = scene.method.support(scene.fluid.surface_tension > 0.0).radius(spacing);
+    Diagnostic::error(Code::OUT_OF_RANGE, scene.fluid.size_span.unwrap_or(scene.fluid.shape_span), message)
+        .help(format!("leave it out: here it would be {usual:.2e} m"))
 }
 
 fn refuse(program: &Program, diagnostic: Diagnostic) -> Error {

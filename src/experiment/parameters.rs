@@ -92,6 +92,9 @@ const MANY_STEPS: f64 = 1e8;
 /// Part of the expected speed from which on that is told.
 const MUCH_STIRRED: f64 = 0.05;
 
+/// The change of density, in per cent, from which on a slow sound is told of.
+const MUCH_COMPRESSED: f64 = 5.0;
+
 /// A warning if the surface tension stirs the fluid, which it does in methods that keep the density: the force on a surface is
 /// no gradient of an energy, and nothing but viscosity takes what it gives.
 pub(super) fn stirring(scene: &Scene, parameters: &Parameters) -> Option<Diagnostic> {
@@ -109,6 +112,21 @@ pub(super) fn stirring(scene: &Scene, parameters: &Parameters) -> Option<Diagnos
         );
         Diagnostic::warning(Code::TENSION_STIRS, at, message)
             .help("write `method: wcsph`, or give the fluid more viscosity, or smaller particles")
+    })
+}
+
+/// A warning if a stated speed of sound is so low that the fluid is compressed like a gas: its density changes by the square of
+/// the speed over that of sound.
+pub(super) fn slow_sound(scene: &Scene, parameters: &Parameters) -> Option<Diagnostic> {
+    let Method::Wcsph(numbers) = scene.method else { return None };
+    let (sound, speed) = (numbers.sound_speed?, parameters.expected_speed);
+    let change = 100.0 * (speed / sound).powi(2);
+    (change > MUCH_COMPRESSED).then(|| {
+        let message = format!(
+            "sound of {sound:.3} m/s is slow for a fluid that may reach {speed:.2} m/s: its density may change by {change:.0} %"
+        );
+        Diagnostic::warning(Code::SLOW_SOUND, scene.fluid.shape_span, message)
+            .help(format!("leave `sound_speed` out, or write {:.2} m/s or more", 10.0 * speed))
     })
 }
 

@@ -2,11 +2,11 @@
 
 use glam::DVec3;
 
-use super::{Experiment, refuse};
+use super::{Body, Experiment, refuse};
 use crate::Solid;
 use crate::compile::Error;
 use crate::diagnostic::{Code, Diagnostic, Span};
-use crate::field::{Field, Region, is_flat};
+use crate::field::{Field, Region, Walls, is_flat};
 use crate::geom::{Aabb, to_thousandths};
 use crate::lower::Scene;
 use crate::solid::Bounds;
@@ -127,6 +127,9 @@ impl Experiment {
                     )
                 })
             }
+            SeedError::TooLarge { .. } | SeedError::NothingLeft(_) if self.is_outside_the_container() => {
+                outside_the_container(&self.scene)
+            }
             SeedError::TooLarge { sites }
                 if sites.is_finite() && fluid.size_span.is_none() && self.is_covered() =>
             {
@@ -169,10 +172,19 @@ impl Experiment {
 
     /// Whether bodies cover all of the fluid's shape, as far as samples show.
     fn is_covered(&self) -> bool {
+        self.is_covered_by(&self.bodies)
+    }
+
+    /// Whether no part of the fluid's shape lies in the container, as far as samples show.
+    fn is_outside_the_container(&self) -> bool {
+        self.scene.container.is_some() && self.is_covered_by(&self.bodies[..1])
+    }
+
+    fn is_covered_by(&self, bodies: &[Body]) -> bool {
         let Ok(bounds) = self.extent() else { return false };
         samples(&bounds.intersection(&self.scene.domain))
             .filter(|at| self.fluid.omega(*at) > 0.0)
-            .all(|at| self.bodies.iter().any(|body| body.solid.omega(at) > 0.0))
+            .all(|at| bodies.iter().any(|body| body.solid.omega(at) > 0.0))
     }
 
     /// The size of the box around the fluid's shape within the domain, m.
@@ -282,6 +294,15 @@ impl Experiment {
         Ok(room.min(wanted as f64))
     }
 
+    /// What there is to say of the place of the fluid before any of its particles is placed.
+    pub fn foreseen(&self) -> Vec<Diagnostic> {
+        match self.estimated_particles() {
+            Ok(_) => self.reach().ok().and_then(|bounds| self.outside(&bounds)).into_iter().collect(),
+            Err(Error::Diagnostics(refusal)) => refusal.list,
+            Err(_) => Vec::new(),
+        }
+    }
+
     /// The same scene with fewer, larger particles. A run of it is short, and its cost per particle forecasts that of
     /// the scene itself.
     ///
@@ -332,10 +353,22 @@ pub fn taken_by_obstacles(fluid: &Solid, obstacles: &[Solid], domain: &Aabb) -> 
     }
     // a film may lie between samples
     let free = || {
-        let bodies = obstacles.iter().map(|obstacle| obstacle as &dyn Field).collect();
+        let quick = quick_fields(obstacles, within);
+        let bodies = quick.iter().map(|field| &**field as &dyn Field).collect();
         Region { shape: fluid, bodies, within }.volume()
     };
     Some(Taken { part: taken / all, is_all: taken == all && free() == 0.0 })
+}
+
+/// Fields with the signs and surfaces of solids in a box, which for solids of many parts cost less than ω itself.
+pub(super) fn quick_fields<'s>(
+    solids: impl IntoIterator<Item = &'s Solid>,
+    over: Aabb,
+) -> Vec<Box<dyn Walls>> {
+    let quick = |solid: &Solid| -> Box<dyn Walls> {
+        if solid.has_many_leaves() { solid.surface(over) } else { Box::new(solid.clone()) }
+    };
+    solids.into_iter().map(quick).collect()
 }
 
 /// Points in the middles of equal cells that fill a box.
@@ -359,4 +392,12 @@ fn length(metres: f64) -> String {
         m if m >= 1e-4 => format!("{} mm", rounded(1e3 * m)),
         m => format!("{} um", rounded(1e6 * m)),
     }
+}
+
+/// The message for a fluid of which nothing lies in the container.
+pub fn outside_the_container(scene: &Scene) -> Diagnostic {
+    let name = scene.container.as_ref().map_or("", |container| &container.name);
+    let message = format!("no part of the fluid's shape lies in the container `{name}`");
+    Diagnostic::error(Code::OBSTACLE_FILLS_BOX, scene.fluid.shape_span, message)
+        .help("a container is the room that the fluid may fill: a solid that is its walls is an obstacle")
 }

@@ -16,11 +16,15 @@ impl<'a> Lowering<'a> {
                 if !builtins::exists(&name.text) =>
             {
                 let message = format!("`{}` is not a function", name.text);
-                self.fail(
-                    Diagnostic::error(Code::NOT_A_FUNCTION, name.span, message)
-                        .at("a value")
-                        .help("to multiply, write `*`"),
-                )
+                let diagnostic = Diagnostic::error(Code::NOT_A_FUNCTION, name.span, message).at("a value");
+                let own = self.names.defined_at(self.scope.source, &name.text);
+                self.fail(match own.filter(|_| self.names.is_standard_function(&name.text)) {
+                    Some(own) => diagnostic.label(own, "which this hides").help(format!(
+                        "the standard `{}(…)` needs its name: choose another one here",
+                        name.text
+                    )),
+                    None => diagnostic.help("to multiply, write `*`"),
+                })
             }
             _ if builtins::exists(&name.text) => self.call_builtin(name, arguments, span),
             _ => {

@@ -135,7 +135,7 @@ impl Lowering<'_> {
             let message = format!("`{}` is not a length or an angle", unit.text);
             return self.fail(
                 Diagnostic::error(Code::UNIT_MISMATCH, unit.span, message).help(
-                    "inside shapes only lengths and angles have units; other units belong to scene keys",
+                    "inside shapes only lengths and angles have units; for another quantity define a name, as in `param w = 3000 rpm`",
                 ),
             );
         }
@@ -357,6 +357,17 @@ impl Lowering<'_> {
         }
         let difference = self.binary(Binary::Sub, terms[1], terms[0], span);
         let Some(&third) = terms.get(2) else { return Value::Number(difference) };
+        let ends = (self.known_value(terms[0]), self.known_value(third));
+        if let (Some(low), Some(high)) = ends
+            && low > high
+        {
+            let message = "no place is between these ends: the first is the greater one";
+            self.report(
+                Diagnostic::warning(Code::REVERSED_CHAIN, span, message)
+                    .at(format!("{low} is greater than {high}"))
+                    .help("exchange them: as it stands it is the layer between them"),
+            );
+        }
         let other = self.binary(Binary::Sub, third, terms[1], span);
         Value::Number(self.binary(Binary::Mul, difference, other, span))
     }

@@ -86,6 +86,9 @@ pub(super) fn value(name: &str) -> Option<&'static str> {
         "p" | "P" | "pos" | "position" | "uv" => "write `[x, y, z]`",
         "if" | "then" | "else" => foreign::CONDITION,
         "path" | "polyline" | "bezier" | "curve" | "contour" | "outline" => CURVES,
+        "m2" | "cm2" | "mm2" => "a power of a unit has a sign, as in `2 cm^2`",
+        "m3" | "cm3" | "mm3" => "a power of a unit has a sign, as in `1000 kg/m^3`",
+        "s2" => "a power of a unit has a sign, as in `9.81 m/s^2`",
         _ => return None,
     })
 }
@@ -206,7 +209,21 @@ fn transformed(name: &str, a: &[&str]) -> Option<Words> {
 fn solid(name: &str, a: &[&str]) -> Option<Words> {
     let size = a.first().filter(|text| text.starts_with('['));
     match name {
-        "cube" | "cuboid" | "Box" | "block" | "brick" | "rect" | "square" | "aabb" => match (a, size) {
+        "rect" | "square" | "rectangle" if size.is_none_or(|size| size.split(',').count() == 2) => {
+            let inner = |text: &str| text.trim_start_matches('[').trim_end_matches(']').trim().to_owned();
+            let corners = match a {
+                [size] if size.starts_with('[') => size.split_once(',').map(|(w, h)| [inner(w), inner(h)]),
+                [side] => Some([side, side].map(|side| inner(side))),
+                [w, h] if !w.starts_with('[') => Some([w, h].map(|side| inner(side))),
+                _ => None,
+            };
+            let [w, h] = corners.unwrap_or_else(|| ["2", "1"].map(String::from));
+            written("`polygon` here", &format!("polygon([[0, 0], [{w}, 0], [{w}, {h}], [0, {h}]])"))
+        }
+        "cube" | "cuboid" | "Box" | "block" | "brick" | "aabb" => match (a, size) {
+            ([_, "true"], Some(size)) => {
+                written("`box(min, max)` here", &format!("box(-{size}/2, {size}/2)"))
+            }
             (_, Some(size)) => written("`box(min, max)` here", &format!("box([0, 0, 0], {size})")),
             ([side], None) => {
                 written("`box(min, max)` here", &format!("box([0, 0, 0], [{side}, {side}, {side}])"))
@@ -216,14 +233,23 @@ fn solid(name: &str, a: &[&str]) -> Option<Words> {
         },
         "sdBox" | "box3" => written("`box(min, max)` here", "box([-1, -1, -1], [1, 1, 1])"),
         "sdSphere" | "spheroid" | "f_sphere" | "orb" => written("`sphere(r)` here", "sphere(1)"),
-        "disk" | "disc" | "circle" | "tube" | "pipe" | "rod" | "sdCylinder" | "frustum" => written(
+        "pipe" | "tube" if size.is_some_and(|points| points.starts_with("[[")) => {
+            written("`sweep(path, radius)` here", &format!("sweep({})", a.join(", ")))
+        }
+        "disk" | "disc" | "circle" | "tube" | "pipe" | "rod" | "sdCylinder" => written(
             "`cylinder(r, h)` here",
-            if name == "pipe" || name == "tube" {
-                "cylinder(0.5, 1) \\ cylinder(0.4, 1)"
+            &if name == "pipe" || name == "tube" {
+                "cylinder(0.5, 1) \\ cylinder(0.4, 1)".into()
             } else {
-                "cylinder(0.5, 1)"
+                format!("cylinder({}, {})", a.first().unwrap_or(&"0.5"), a.get(1).unwrap_or(&"1"))
             },
         ),
+        "frustum" => match a {
+            [low, top, h] => {
+                written("`.taper(h, top)` here", &format!("cylinder({low}, {h}).taper({h}, ({top})/({low}))"))
+            }
+            _ => written("`.taper(h, top)` here", "cylinder(1, 2).taper(2, 0.5)"),
+        },
         "plane" | "halfspace" | "half_plane" | "sdPlane" => {
             written("`half_space(normal, point)` here", "half_space([0, 0, 1], [0, 0, 0])")
         }

@@ -68,6 +68,10 @@ impl<'a> Lowering<'a> {
             }
             let message = format!("{} has no part `{}`", value.describe(), name.text);
             let diagnostic = Diagnostic::error(Code::WRONG_TYPE, name.span, message);
+            if let ExprKind::Quantity { unit, .. } = &of.kind {
+                let units = format!("the parts of a unit are joined by `·`: `{}·{}`", unit.text, name.text);
+                return self.fail(diagnostic.help(format!("{units}; a viscosity may also be in `kg/m/s`")));
+            }
             return self.fail(match value {
                 Value::Vector(_) | Value::List(_) => diagnostic.help("a vector has .x, .y and .z"),
                 Value::Number(_) | Value::Text(_) | Value::Failed => {

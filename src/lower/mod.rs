@@ -306,7 +306,7 @@ impl<'a> Lowering<'a> {
         self.report(
             Diagnostic::error(Code::OVERRIDE, param.span, message)
                 .at("declared here")
-                .help(format!("write -D {name}=\"{}\"", in_unit(unit.factor, *unit, text))),
+                .help(format!("as in -D {name}=\"{}\"", in_unit(unit.factor, *unit, text))),
         );
         false
     }
@@ -414,7 +414,7 @@ impl<'a> Lowering<'a> {
         self.names.define(self.scope.source, &definition.name, Kind::Solid(value));
         if let Some(node) = node {
             let name = definition.name.text.clone();
-            self.warn_of_constant(&name, node, &definition.value);
+            self.warn_of_constant(&format!("solid `{name}`"), node, &definition.value);
             self.module.solids.push(NamedSolid { name, node, tolerance, span: definition.name.span });
         }
     }
@@ -542,6 +542,9 @@ impl<'a> Lowering<'a> {
             let mut diagnostic = Diagnostic::error(Code::OVERRIDE, span, message);
             diagnostic = match crate::diagnostic::nearest(name, declared.iter().map(String::as_str)) {
                 Some(near) => diagnostic.help(format!("did you mean `{near}`?")),
+                None if vocabulary::is_key(name) => diagnostic.help(format!(
+                    "it is a key of scenes: declare a param for it, as in `param p = …` and `{name}: p`, and write `-D p=…`"
+                )),
                 None if declared.is_empty() => diagnostic.help("the file declares no params"),
                 None => diagnostic.help(format!("declared params: {}", declared.join(", "))),
             };

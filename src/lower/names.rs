@@ -136,6 +136,11 @@ impl<'a> Names<'a> {
         self.of(source, name).map(|global| global.span)
     }
 
+    /// Whether the prelude has a function of this name.
+    pub fn is_standard_function(&self, name: &str) -> bool {
+        self.prelude.get(name).is_some_and(|global| matches!(global.kind, Kind::Function(_)))
+    }
+
     /// What a name means in code of a source; counts as a use.
     pub fn get(&mut self, source: SourceId, name: &str) -> Option<&Global<'a>> {
         if source.is_users() && self.of(source, name).is_some() {

@@ -40,11 +40,11 @@ impl Lowering<'_> {
         false
     }
 
-    /// Warns of a solid that has no surface because its ω is a constant.
-    pub fn warn_of_constant(&mut self, name: &str, node: Node, value: &Expr) {
+    /// Warns of a shape that has no surface because its ω is a constant.
+    pub fn warn_of_constant(&mut self, what: &str, node: Node, value: &Expr) {
         let Some(constant) = self.known_value(node) else { return };
         let holds = if constant > 0.0 { "holds all of space" } else { "is empty" };
-        let message = format!("solid `{name}` is the constant {constant}: it {holds}");
+        let message = format!("{what} is the constant {constant}: it {holds}");
         let warning = Diagnostic::warning(Code::CONSTANT_SOLID, value.span, message);
         let help = match self.written(value) {
             Some(size) if constant > 0.0 => {

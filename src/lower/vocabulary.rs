@@ -50,6 +50,12 @@ pub fn keys(block: Option<&str>, method: Method) -> Vec<&'static str> {
     keys
 }
 
+/// Whether scenes, or blocks in them that are not repeated, have a key of this name with any method.
+pub fn is_key(name: &str) -> bool {
+    const BLOCKS: [Option<&str>; 4] = [None, Some("fluid"), Some("solver"), Some("run")];
+    Method::all().into_iter().any(|method| BLOCKS.iter().any(|block| keys(*block, method).contains(&name)))
+}
+
 /// The words that a key takes as its value; none if it takes a number, a name or an expression.
 pub fn words(key: &str) -> Vec<String> {
     let fixed = |words: &[&str]| words.iter().map(ToString::to_string).collect();

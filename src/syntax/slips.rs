@@ -2,6 +2,7 @@
 //! another language.
 
 mod heads;
+mod units;
 
 use super::foreign;
 use super::words::{ITEM_WORDS, KEYWORDS, token_at};
@@ -67,6 +68,14 @@ impl<'t> Slip<'t> {
     /// A word where none may stand.
     fn word(&self) -> Option<Diagnostic> {
         let called = self.after().starts_with('(');
+        if self.found == "import" && called {
+            let path = bracketed(self.after()).filter(|path| fits(&[path]) && path.contains('"'));
+            let path = path.map_or("\"part.stl\"", str::trim);
+            return Some(
+                self.unexpected()
+                    .help(format!("a mesh from a file is a shape, as in `solid part = mesh({path})`")),
+            );
+        }
         if KEYWORDS.contains(&self.found) && called && !self.ends_an_operand() {
             return self.operator_as_a_function();
         }
@@ -79,6 +88,12 @@ impl<'t> Slip<'t> {
         let line = self.on_its_line().trim_end();
         if !called && line.ends_with(|c: char| c.is_ascii_digit() || c == '.') && number_ends(line) {
             return Some(self.unit(last_number(line)));
+        }
+        if !called && self.ends_an_operand() {
+            let diagnostic = self.unit_of_a_formula(line, self.found, self.span);
+            if diagnostic.is_some() {
+                return diagnostic;
+            }
         }
         if last_word(line) == "for" {
             return Some(
@@ -125,7 +140,8 @@ impl<'t> Slip<'t> {
             return None;
         }
         let line = line.lines().next().unwrap_or_default();
-        let quoted = line.split('"').nth(1).unwrap_or("chess.rfm");
+        let word = line.split_whitespace().next().filter(|word| word.contains('.') && fits(&[word]));
+        let quoted = line.split('"').nth(1).or(word).unwrap_or("chess.rfm");
         let stem = quoted.rsplit(['/', '\\']).next().unwrap_or(quoted).split('.').next().unwrap_or(quoted);
         let is_name = stem.starts_with(|c: char| c.is_alphabetic())
             && stem.chars().all(|c| c.is_alphanumeric() || c == '_')
@@ -174,59 +190,17 @@ impl<'t> Slip<'t> {
             .help("items start with `param`, `let`, `fn`, `solid` or `scene`")
     }
 
-    /// A word after a number that is no unit.
-    fn unit(&self, number: &str) -> Diagnostic {
-        const UNITS: [&str; 14] =
-            ["m", "mm", "cm", "km", "s", "ms", "min", "kg", "g", "N", "Pa", "J", "deg", "rad"];
-        let word = self.found;
-        let unknown =
-            Diagnostic::error(Code::UNKNOWN_UNIT, self.span, format!("unknown unit `{word}` after a number"))
-                .at("not a unit");
-        if foreign::is_letter_of_type(word) {
-            return unknown.help(format!("numbers have no type: write `{number}`"));
-        }
-        if let Some(written) = foreign::quantity(number, word) {
-            return unknown.help(format!("write `{written}`"));
-        }
-        if word == "pi" {
-            return unknown.help(format!("a product has a sign: write `{number}*pi`"));
-        }
-        if word.starts_with('_') {
-            let digits: String = word.chars().filter(|c| *c != '_').collect();
-            return unknown.help(format!("digits are not grouped: write `{number}{digits}`"));
-        }
-        unknown
-            .help(format!("a word after a number is its unit; to multiply, write `{number}*{word}`"))
-            .suggest(word, UNITS.into_iter().filter(|_| word.chars().count() > 1))
-    }
-
-    /// `viscosity: 1 cP }`: what follows the number is no unit, so the grammar takes it for the next key.
-    fn unit_taken_for_a_key(&self) -> Option<Diagnostic> {
-        let line = self.on_its_line().trim_end();
-        let word = last_word(line);
-        let before = line[..line.len() - word.len()].trim_end();
-        if !self.in_braces() || !number_ends(before) || self.found == ":" {
-            return None;
-        }
-        let written = foreign::quantity(last_number(before), word)?;
-        let line_start = self.at - self.on_its_line().len();
-        let start = line_start + line.len() - word.len();
-        let span = Span::new(self.span.source, start, start + word.len());
-        let message = format!("unknown unit `{word}` after a number");
-        Some(
-            Diagnostic::error(Code::UNKNOWN_UNIT, span, message)
-                .at("not a unit")
-                .help(format!("write `{written}`")),
-        )
-    }
-
     /// `translate([1, 0, 0]) sphere(1)`
     fn transform_in_front(&self) -> Option<Diagnostic> {
         let before = self.on_its_line().trim_end();
         let open = opening(before)?;
         let name = last_word(&before[..open]);
-        let method = foreign::method(name)?;
         let shape = format!("{}({})", self.found, bracketed(self.after())?);
+        if before[..open].strip_suffix(name).is_some_and(|heads| heads.ends_with('.')) {
+            let written = if fits(&[&shape]) { shape } else { format!("{}(…)", self.found) };
+            return Some(self.unexpected().help(format!("a method follows a point: write `.{written}`")));
+        }
+        let method = foreign::method(name)?;
         let arguments = &before[open + 1..before.len() - 1];
         let written = match (fits(&[&shape, arguments]), foreign::method_call(name, arguments)) {
             (true, Some(call)) => format!("{shape}{call}"),
@@ -271,7 +245,7 @@ impl<'t> Slip<'t> {
             let kind = if begins_scene { "scene " } else { "" };
             return Some(self.syntax("a block has no `=`").help(format!("write `{kind}{key} {{ … }}`")));
         }
-        if self.in_braces() && !key.is_empty() && !heads.ends_with(['(', '=', '<', '>', '+', '*']) {
+        if self.in_braces() && !key.is_empty() && !heads.ends_with(['(', '=', '<', '>', '+', '*', ':']) {
             let line = value.lines().next().unwrap_or_default();
             let value = first_part(line);
             let value = if value.is_empty() || !fits(&[value]) { "…" } else { value };
@@ -372,6 +346,9 @@ impl<'t> Slip<'t> {
                 "decimals are written with a point: `0.5`"
             }
             ";" => "leave it out: an item ends where the next one begins",
+            "\"" if after.split_once('"').is_some_and(|(_, rest)| rest.trim_start().starts_with(':')) => {
+                "a key has no quotes, as in `density: 1000`"
+            }
             "\"" => {
                 return Some(
                     self.syntax("the text is not closed").help("a text ends with `\"` on its own line"),
@@ -388,6 +365,7 @@ impl<'t> Slip<'t> {
             }
             "{" if self.solid_in_braces().is_some() => return self.solid_in_braces(),
             "{" if self.arguments_in_braces().is_some() => return self.arguments_in_braces(),
+            "{" if last_word(before) == "scene" => "a scene has a name: write `scene tank { … }`",
             "{" if before.ends_with(')') || !self.in_braces() => {
                 "shapes are joined by `or`, `and` and `\\`: write `solid part = sphere(1) \\ sphere(0.5)`"
             }
@@ -470,17 +448,17 @@ fn closing(text: &str) -> Option<usize> {
 
 /// The last operand of a text: what stands behind a bracket that is still open, a sign or a word that joins.
 fn last_part(text: &str) -> &str {
-    let mut depth = 0_i32;
-    let mut start = 0;
+    // where the operand begins, and those around it
+    let (mut start, mut around) = (0, Vec::new());
     for (at, c) in text.char_indices() {
         match c {
-            '(' | '[' => depth += 1,
-            ')' | ']' => depth -= 1,
+            '(' | '[' => {
+                around.push(start);
+                start = at + c.len_utf8();
+            }
+            ')' | ']' => start = around.pop().unwrap_or(start),
+            '=' | ':' | ',' | '&' | '|' | '\\' | '<' | '>' => start = at + c.len_utf8(),
             _ => {}
-        }
-        let opens = depth > 0 && matches!(c, '(' | '[');
-        if opens || matches!(c, '=' | ':' | ',' | '&' | '|' | '\\' | '<' | '>') {
-            start = at + c.len_utf8();
         }
         if [" and ", " or ", " not "].iter().any(|word| text[..at].ends_with(word)) {
             start = at;

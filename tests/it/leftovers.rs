@@ -70,3 +70,30 @@ fn what_killed_commands_leave_is_removed_and_what_others_write_is_not() {
     rfm(here, &["mesh", "post.rfm", "-o", "p.stl", "--cells", "16"]).expect(0);
     assert_eq!(files(here), ["p.stl", "post.rfm"]);
 }
+
+/// A device is written, not replaced: as root, `-o /dev/null` would leave a plain file there.
+#[cfg(unix)]
+#[test]
+fn devices_pipes_and_links_stay_what_they_are() {
+    use std::os::unix::fs::{FileTypeExt, symlink};
+    let folder = tempfile::tempdir().unwrap();
+    let here = folder.path();
+    std::fs::write(here.join("drop.rfm"), SMALL).unwrap();
+    // links, so that a test that fails harms nobody
+    symlink("/dev/null", here.join("null.stl")).unwrap();
+    symlink("part.stl", here.join("link.stl")).unwrap();
+    std::fs::write(here.join("part.stl"), "old").unwrap();
+    assert!(std::process::Command::new("mkfifo").arg(here.join("pipe.stl")).status().unwrap().success());
+    let pipe = here.join("pipe.stl");
+    let reader = std::thread::spawn(move || std::fs::read(pipe).unwrap());
+    for name in ["null.stl", "link.stl", "pipe.stl"] {
+        rfm(here, &["mesh", "drop.rfm", "--cells", "16", "-o", name]).expect(0);
+    }
+    assert!(here.join("null.stl").is_symlink() && here.join("link.stl").is_symlink());
+    let part = std::fs::read(here.join("part.stl")).unwrap();
+    assert!(part.len() > 84);
+    assert_eq!(reader.join().unwrap(), part);
+    assert!(std::fs::symlink_metadata(here.join("pipe.stl")).unwrap().file_type().is_fifo());
+    let here_again = files(here);
+    assert_eq!(here_again, ["drop.rfm", "link.stl", "null.stl", "part.stl", "pipe.stl"]);
+}

@@ -85,6 +85,15 @@ const WORDS: &[&str] = &[
     "solid s = path([[0, 0], [1, 0], [0, 1]]).extrude(0, 1)",
     "solid s = polygon(arc)",
     "solid s = polygon([[0, 0], spline, [0, 1]])",
+    "solid s = square([1, 2]).extrude(0, 1)",
+    "solid s = rect(1, 2).extrude(0, 1)",
+    "solid s = frustum(1, 0.5, 2)",
+    "solid s = circle(2)",
+    "solid s = pipe([[0, 0, 0], [1, 0, 0]], 0.1)",
+    "solid s = cube([1, 2, 3], true)",
+    "solid s = import(\"part.stl\")",
+    "import part.stl",
+    "solid box = sphere(1)\nsolid s = box([0, 0, 0], [1, 1, 1])",
 ];
 
 /// Choices, lists, maps of space, profiles and joints.
@@ -187,6 +196,8 @@ const SIGNS: &[&str] = &[
     "let f(x) = x^2\nsolid s = f(x) <= 1",
     "fn f(a) { a^2 }\nsolid s = f(x) <= 1",
     "solid my-part = sphere(1)",
+    "solid s = (x - 1)^2 + (y - 1)^2 = 4 and 0 <= z <= 1",
+    "solid s = box().move([1, 0, 0]) move([0, 1, 0])",
 ];
 
 /// Arguments, angles, lengths, and what is rarely meant.
@@ -218,6 +229,9 @@ const VALUES: &[&str] = &[
     "solid s = sphere(1).move([0, 0, -90 deg])",
     "solid s = box().rotate_z(5 mm)",
     "solid s = sphere(1 kg)",
+    "param n = 2\nsolid s = sphere(n m)",
+    "param n = 2\nsolid s = sphere(1 + n mm)",
+    "param n = 2\nsolid s = box([0, 0, 0], [(1 + n) cm, 1, 1])",
     "solid s = 5",
     "solid s = -1",
     "solid s = 1/0 - x",
@@ -235,6 +249,10 @@ const VALUES: &[&str] = &[
     "param a = 45 deg in 90 deg .. 0 deg\nsolid s = box().rotate_z(a)",
     "",
     "# nothing but a remark",
+    "solid s = sphere(2 in)",
+    "solid s = sphere(1/2 inch)",
+    "solid s = 5 <= z <= 2 and sphere(3)",
+    "solid s = box().rotate_z(3000 rpm*t)",
 ];
 
 /// The scene that a line of [`SCENES`] changes: a line replaces the one with its key, or is added.
@@ -309,6 +327,25 @@ const SCENES: &[&str] = &[
     "inlet { velocity: [1, 0, 0] }",
     "time_step: 0.001 s",
     "box: [0, 0, 0] .. [1, 1, 1]",
+    "run { until: sqrt(2) s }",
+    "probe load { force: post, known: [0, 0, -490.5*sqrt(2) N] }",
+    "fluid { shape: ball([0.5, 0.5, 0.7], 0.2), spacing: 5 cm, nu: 1e-6 }",
+    "fluid { shape: ball([0.5, 0.5, 0.7], 0.2), spacing: 5 cm, viscosity: 1e-6 m^2/s }",
+    "fluid { shape: ball([0.5, 0.5, 0.7], 0.2), spacing: 5 cm, viscosity: 1 mPa s }",
+    "fluid { shape: ball([0.5, 0.5, 0.7], 0.2), spacing: 5 cm, viscosity: 0.001 Pa.s }",
+    "fluid { shape: ball([0.5, 0.5, 0.7], 0.2), spacing: 5 cm, density: 1000 kg/m3 }",
+    "fluid { shape: ball([0.5, 0.5, 0.7], 0.2), spacing: 5 cm, density: 1000 kg m^-3 }",
+    "fluid { shape: ball([0.5, 0.5, 0.7], 0.2), spacing: 5 cm, surface_tension: 72 dyn/cm }",
+    "fluid { shape: ball([0.5, 0.5, 0.7], 0.2), spacing: 5 cm, temperature: 20 C }",
+    "fluid { shape: ball([0.5, 0.5, 0.7], 0.2), spacing: 5 cm, support_radius: 1 mm }",
+    "run { until: 1 s, save_every: 1 ns }",
+    "run { until: 1 s, fps: 25 }",
+    "picture { cut: z = 0.5 }",
+    "box { max: 1 }",
+    "boundary: periodic",
+    "\"box\": { \"max\": [1, 1, 1] }",
+    "container { solid: post }",
+    "fluid { shape: 5, spacing: 5 cm }",
 ];
 
 fn program(text: &str) -> Result<Program, Diagnostics> {
@@ -513,6 +550,13 @@ const COMMANDS: &[(&[&str], i32)] = &[
     (&["mesh", "post.rfm", "-o", "a\u{202e}b/p.stl"], 2),
     (&["explain", "\u{1b}]0;title\u{7}"], 2),
     (&["check", "red.rfm"], 0),
+    (&["post.rfm"], 2),
+    (&["mesh", "post.rfm", "-s", "post", "--cells", "5mm", "-o", "p.stl"], 2),
+    (&["eval", "post.rfm", "--what", "omega", "--at", "0,0,0"], 2),
+    (&["eval", "post.rfm", "--at", "1", "2", "3"], 2),
+    (&["run", "post.rfm", "--save-every", "0.1"], 2),
+    (&["check", "post.rfm", "-D", "particles=1000"], 2),
+    (&["check", "post.rfm", "-s", "post", "--slice", "z=0.1,z=5", "-o", "s.svg"], 0),
 ];
 
 #[test]

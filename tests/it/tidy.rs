@@ -24,7 +24,7 @@ const MAY_USE: &[(&str, &[&str])] = &[
     ("triangles", &["geom", "interval", "table"]),
     ("field", &["geom", "interval"]),
     ("files", &["table"]),
-    ("syntax", &["diagnostic"]),
+    ("syntax", &["diagnostic", "quantity"]),
     ("ir", &["diagnostic", "geom", "interval", "precision", "table"]),
     (
         "lower",

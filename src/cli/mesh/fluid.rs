@@ -10,7 +10,7 @@ use glam::DVec3;
 use serde::Serialize;
 
 use super::super::args::{Mesh as Options, Shared};
-use super::super::failure::{Failure, note};
+use super::super::failure::{Failure, complain, note};
 use super::super::saved::{self, RunFigures};
 use super::super::surfaces::{self, Origins};
 use super::super::{output, progress};
@@ -92,12 +92,19 @@ pub(super) fn run(shared: &Shared, options: &Options) -> Result<(), Failure> {
         format: job.ending,
         surfaces,
     };
+    let particles: usize = summary.surfaces.iter().map(|surface| surface.particles).sum();
+    let found = if summary.triangles == 0 && particles > 0 {
+        complain("no frame has a surface: --radius or --cell is larger than the fluid");
+        Err(Failure::Findings)
+    } else {
+        Ok(())
+    };
     if shared.json {
-        return output::json(&summary);
+        return output::json(&summary).and(found);
     }
     print(&summary);
     say!("written to {}", job.target.path().shown());
-    Ok(())
+    found
 }
 
 /// Where surfaces go.

@@ -36,6 +36,9 @@ impl Tolerance {
     }
 }
 
+/// The part of a mesh's thickness from which on a tolerance is told of.
+const COARSE: f64 = 0.2;
+
 /// Parts of the tolerance to aim at, in turn. The measure has other samples than the simplification, and some
 /// of them lie a few hundredths further off.
 const AIMS: [f64; 3] = [0.9, 0.75, 0.5];
@@ -49,6 +52,13 @@ pub(super) fn simplified(
     reference: &Reference<'_>,
 ) -> Simplified {
     let tolerance = tolerance.of(mesh);
+    let bounds = mesh.positions.iter().fold(Aabb::EMPTY, |bounds, p| bounds.including(*p));
+    let thickness = bounds.size().min_element();
+    if tolerance > COARSE * thickness {
+        note(format!(
+            "--simplify allows {tolerance:.2e} m, and the mesh is only {thickness:.2e} m thick: little is left of its shape"
+        ));
+    }
     let from = mesh.triangles.len();
     let (mut simplifying, mut measuring) = (0.0, 0.0);
     let measure = |mesh: &Mesh, time: &mut f64| {

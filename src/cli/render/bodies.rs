@@ -8,7 +8,7 @@ use super::options::Render;
 use crate::cli::failure::Failure;
 use crate::cli::output::Shown;
 use crate::cli::saved::{self, RunFigures};
-use crate::cli::scenery::{Drawn, half_towards_eye, out_of_the_way};
+use crate::cli::scenery::{Drawn, half_towards_eye, opened_by, out_of_the_way};
 use crate::cli::values::CutFlag;
 use rfm::fluid_surface::{FrameEntry, read_arrays, read_mesh};
 use rfm::mesh::Mesh;
@@ -77,7 +77,7 @@ impl Bodies {
             }
             _ if is_glass(name) => Drawn::Glass(None),
             Some(CutFlag::None) => Drawn::Whole,
-            Some(CutFlag::Plane(plane)) => Drawn::Open(half_towards_eye(plane, camera)),
+            Some(CutFlag::Plane(plane)) => opened_by(half_towards_eye(plane, camera), mesh),
             Some(CutFlag::Auto) | None => out_of_the_way(camera, name, mesh, &self.samples),
         };
         Ok(self.names.iter().zip(&self.meshes).map(drawn).collect())

@@ -246,7 +246,7 @@ fn opened(look: Look<'_>, experiment: &Experiment, meshes: &[Mesh]) -> Result<Ve
         _ if is_hidden(name) => Drawn::Hidden,
         _ if is_glass(name) => Drawn::Glass(fixed.flatten()),
         Some(None) => Drawn::Whole,
-        Some(Some(cut)) => Drawn::Open(cut),
+        Some(Some(cut)) => scenery::opened_by(cut, mesh),
         None => out_of_the_way(&small, name, mesh, &samples),
     };
     Ok(names.iter().zip(meshes).map(drawn).collect())

@@ -137,7 +137,10 @@ impl<'a> Lowering<'a> {
     fn fluid(&mut self, block: &Block<'a>, method: &Method) -> Option<Fluid> {
         let defaults = method.fluid();
         let shape = match block.setting("shape") {
-            Some((_, value)) => self.shape(value).map(|node| (node, value.span)),
+            Some((_, value)) => self.shape(value).map(|node| {
+                self.warn_of_constant("the fluid's shape", node, value);
+                (node, value.span)
+            }),
             None => {
                 self.missing(block, "shape", "write `shape: ball([1.5, 1.5, 2], 0.4)` or any other solid");
                 None

@@ -23,8 +23,18 @@ const INNER: [(&str, &[&str]); 4] = [
     ("solver", &["precision"]),
 ];
 
+/// What there is to say to a kinematic viscosity.
+const DYNAMIC: &str =
+    "`viscosity` is the dynamic one, that is the kinematic one times the density: water has `1e-3 Pa·s`";
+
 /// What other programs have in a block and this one has not, with what there is in its place.
-const ABSENT: [(&str, &[&str], &str); 4] = [
+const ABSENT: [(&str, &[&str], &str); 6] = [
+    (
+        "a run",
+        &["fps", "frame_rate", "framerate"],
+        "the time between frames is stated: 25 in a second are `save_every: 0.04 s`",
+    ),
+    ("a fluid", &["nu", "kinematic_viscosity"], DYNAMIC),
     (
         "an obstacle",
         &["velocity", "motion", "speed", "angular_velocity", "omega"],
@@ -37,7 +47,7 @@ const ABSENT: [(&str, &[&str], &str); 4] = [
     ),
     (
         "a scene",
-        &["inlet", "outlet", "inflow", "outflow", "source", "sink", "emitter", "periodic"],
+        &["inlet", "outlet", "inflow", "outflow", "source", "sink", "emitter", "periodic", "boundary"],
         "there are no inlets, outlets and periodic boxes: begin with the fluid that is needed",
     ),
     (
@@ -67,8 +77,10 @@ impl<'a> Lowering<'a> {
 
     /// Reports that a block lacks a key that it needs.
     pub(in crate::lower) fn missing(&mut self, block: &Block<'_>, key: &str, help: &str) {
-        if block.entries.iter().any(|entry| entry.key().text == key) {
-            return; // the key is there in the wrong form, which was reported
+        // in the wrong form, or by another name, which was reported
+        let is_it = |text: &str| text == key || foreign::key(text) == Some(key);
+        if block.entries.iter().any(|entry| is_it(&entry.key().text)) {
+            return;
         }
         let message = format!("{} needs `{key}`", block.what);
         self.report(Diagnostic::error(Code::SCENE_MISSING, block.span, message).help(help));
@@ -177,8 +189,11 @@ impl<'a> Lowering<'a> {
         let written = self.written(value).unwrap_or("1").to_string();
         // a number for gravity is how strong it is, and it points down
         let down = if key == "gravity" && !written.starts_with('-') { "-" } else { "" };
-        let written = format!("{down}{written}");
-        self.report(diagnostic.help(format!("write `{key}: [0, 0, {written}]`")));
+        let written = match key {
+            "min" | "max" => format!("[{written}, {written}, {written}]"),
+            _ => format!("[0, 0, {down}{written}]"),
+        };
+        self.report(diagnostic.help(format!("write `{key}: {written}`")));
         None
     }
 
@@ -296,6 +311,7 @@ impl<'a> Lowering<'a> {
                 if parsed.dimension != expected {
                     let message = format!("`{}` is not a unit of `{key}`", unit.text);
                     let help = match expected.unit() {
+                        Some(_) if key == "viscosity" && unit.text.starts_with("m^2/s") => DYNAMIC.into(),
                         Some(unit) => format!("write for example `1 {unit}`"),
                         None => format!("`{key}` has no unit"),
                     };

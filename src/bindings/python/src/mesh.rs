@@ -1,6 +1,6 @@
 //! The class `Mesh`.
 
-use std::io::BufWriter;
+use std::io::{BufWriter, Write};
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, OnceLock};
 
@@ -154,6 +154,15 @@ pub fn write_file(
     let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
     // a folder that does not exist is better found here than behind the name of a temporary file
     std::fs::metadata(folder).map_err(failed)?;
+    // a device or a pipe (/dev/null) is written as it stands: a file must not take its place
+    if std::fs::metadata(path).is_ok_and(|there| !there.is_file() && !there.is_dir()) {
+        let mut out = BufWriter::new(std::fs::File::options().write(true).open(path).map_err(failed)?);
+        return fill(&mut out).and_then(|()| out.flush()).map_err(failed);
+    }
+    // a link stays a link
+    let linked = path.is_symlink().then(|| path.canonicalize().ok()).flatten();
+    let path = linked.as_deref().unwrap_or(path);
+    let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
     let mut temporary = tempfile::Builder::new();
     temporary.prefix(".rfm-");
     #[cfg(unix)]

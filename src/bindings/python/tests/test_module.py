@@ -15,6 +15,7 @@ import threading
 import time
 import xml.etree.ElementTree
 import zlib
+from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 import pytest
@@ -61,6 +62,20 @@ def test_meshes_are_arrays(pawn, tmp_path):
         assert path.stat().st_size > 1000
     mesh.save(str(tmp_path / "text.stl"), ascii=True)
     assert (tmp_path / "text.stl").read_text().startswith("solid rfm")
+
+
+@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="no pipes with names here")
+def test_a_mesh_takes_the_place_of_no_pipe_and_no_link(pawn, tmp_path):
+    mesh, pipe, link = pawn.mesh(16), tmp_path / "pipe.stl", tmp_path / "link.stl"
+    os.mkfifo(pipe)
+    link.symlink_to("part.stl")
+    (tmp_path / "part.stl").write_text("old")
+    with ThreadPoolExecutor() as pool:
+        read = pool.submit(pipe.read_bytes)
+        mesh.save(pipe)
+    mesh.save(link)
+    assert pipe.is_fifo() and link.is_symlink()
+    assert read.result() == (tmp_path / "part.stl").read_bytes() and len(read.result()) > 84
 
 
 def test_a_saved_mesh_is_that_of_the_program(pawn, program, tmp_path):

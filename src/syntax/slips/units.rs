@@ -1,0 +1,186 @@
+//! Slips in units: behind formulas, of other systems, and in other spellings.
+
+use super::super::foreign;
+use super::{Slip, fits, last_part, last_word, number_ends};
+use crate::diagnostic::{Code, Diagnostic, Span};
+use crate::quantity::parse_unit;
+
+impl Slip<'_> {
+    /// A word after a number that is no unit.
+    pub(super) fn unit(&self, number: &str) -> Diagnostic {
+        const UNITS: [&str; 14] =
+            ["m", "mm", "cm", "km", "s", "ms", "min", "kg", "g", "N", "Pa", "J", "deg", "rad"];
+        let word = self.found;
+        let unknown =
+            Diagnostic::error(Code::UNKNOWN_UNIT, self.span, format!("unknown unit `{word}` after a number"))
+                .at("not a unit");
+        if foreign::is_letter_of_type(word) {
+            return unknown.help(format!("numbers have no type: write `{number}`"));
+        }
+        if let Some(written) = foreign::quantity(number, word) {
+            let line = self.on_its_line().trim_end();
+            let before = line.strip_suffix(number).unwrap_or(line);
+            // `1/2 inch` is half of one
+            return unknown.help(match foreign::quantity("1", word).filter(|_| before.ends_with('/')) {
+                Some(one) => format!("write `{}*{one}`", last_part(line)),
+                None => format!("write `{written}`"),
+            });
+        }
+        if word == "pi" {
+            return unknown.help(format!("a product has a sign: write `{number}*pi`"));
+        }
+        if word.starts_with('_') {
+            let digits: String = word.chars().filter(|c| *c != '_').collect();
+            return unknown.help(format!("digits are not grouped: write `{number}{digits}`"));
+        }
+        unknown
+            .help(format!("a word after a number is its unit; to multiply, write `{number}*{word}`"))
+            .suggest(word, UNITS.into_iter().filter(|_| word.chars().count() > 1))
+    }
+
+    /// `n mm`, `(1 + n) mm`: a unit behind something that is no number.
+    pub(super) fn unit_of_a_formula(&self, before: &str, unit: &str, span: Span) -> Option<Diagnostic> {
+        parse_unit(unit)?;
+        let value = last_part(before).trim();
+        let (value, is_sum) = if fits(&[value]) { (value, has_a_sum(value)) } else { ("n", false) };
+        let written = if is_sum { format!("({value})*1 {unit}") } else { format!("{value}*1 {unit}") };
+        let message = "a unit stands behind a number";
+        Some(Diagnostic::error(Code::SYNTAX, span, message).help(format!("write `{written}`")))
+    }
+
+    /// `viscosity: 1 cP }`, `1000 kg m^-3`: what follows the number is no unit, or goes on behind one, so the grammar takes it for
+    /// the next key.
+    pub(super) fn unit_taken_for_a_key(&self) -> Option<Diagnostic> {
+        let line = self.on_its_line().trim_end();
+        let word = last_word(line);
+        if !self.in_braces() || matches!(self.found, ":" | "{") || word.is_empty() {
+            return None;
+        }
+        let line_start = self.at - self.on_its_line().len();
+        let value_start = line.rfind([':', ',', '[', '{', '='])? + 1;
+        let value = self.text[line_start + value_start..].lines().next().unwrap_or_default();
+        let value = value.split([',', '}', ']', ')', '#', ';']).next().unwrap_or_default().trim_end();
+        let number = value.len() - value.trim_start().trim_start_matches('-').len();
+        let number_length = number_at(&value[number..]);
+        if number_length == 0 {
+            let before = line[..line.len() - word.len()].trim_end();
+            let start = line_start + line.len() - word.len();
+            let span = Span::new(self.span.source, start, start + word.len());
+            let is_value = before.ends_with(|c: char| c.is_alphanumeric() || ")_²³".contains(c));
+            return (is_value && !number_ends(before) && line[..value_start].ends_with(':'))
+                .then(|| self.unit_of_a_formula(before, word, span))
+                .flatten();
+        }
+        let (number, unit) = value[number..].split_at(number_length);
+        let start = line_start + value_start + value.len() - unit.trim_start().len();
+        let unit = unit.trim();
+        if unit.is_empty() || parse_unit(unit).is_some() || !fits(&[unit]) {
+            return None;
+        }
+        // of several words each must be a unit: what follows one may be the next key
+        let words: Vec<&str> = unit.split(SEPARATORS).filter(|word| !word.is_empty()).collect();
+        let is_unit = |word: &&str| {
+            let base = base(word);
+            parse_unit(base).is_some() || foreign::quantity("1", base).is_some()
+        };
+        let is_word = |c: char| c.is_alphanumeric() || c == '_' || c == '°';
+        if !words.iter().all(|word| base(word).chars().all(is_word))
+            || words.len() > 1 && !words.iter().all(is_unit)
+        {
+            return None;
+        }
+        let span = Span::new(self.span.source, start, start + unit.len());
+        let own = spelled(unit);
+        let written = match parse_unit(&own) {
+            Some(_) => Some(format!("{number} {own}")),
+            None => foreign::quantity(number, &own),
+        };
+        let message = format!("unknown unit `{unit}` after a number");
+        let help = match written {
+            Some(written) => format!("write `{written}`"),
+            None => {
+                "units are made of m, s, kg, N, Pa, J, deg and their multiples, as in `kg/m^3` and `Pa·s`"
+                    .into()
+            }
+        };
+        Some(Diagnostic::error(Code::UNKNOWN_UNIT, span, message).at("not a unit").help(help))
+    }
+}
+
+/// The length of the number that a text begins with.
+fn number_at(text: &str) -> usize {
+    let length =
+        |text: &str| text.len() - text.trim_start_matches(|c: char| c.is_ascii_digit() || c == '.').len();
+    let mantissa = length(text);
+    let exponent = text[mantissa..].strip_prefix(['e', 'E']).map_or(0, |rest| {
+        let sign = usize::from(rest.starts_with(['+', '-']));
+        let digits = length(&rest[sign..]);
+        if digits > 0 { 1 + sign + digits } else { 0 }
+    });
+    if text.starts_with(|c: char| c.is_ascii_digit() || c == '.') { mantissa + exponent } else { 0 }
+}
+
+/// What stands between the parts of a unit.
+const SEPARATORS: [char; 5] = [' ', '*', '·', '.', '/'];
+
+/// A part of a unit without its power.
+fn base(part: &str) -> &str {
+    part.trim_end_matches(|c: char| c.is_ascii_digit() || "-^⁻¹²³".contains(c))
+}
+
+/// A unit as it is spelled here: `kg m^-3` is `kg/m^3`, `Pa.s` is `Pa·s`, and `g/cm3` is `g/cm^3`.
+fn spelled(unit: &str) -> String {
+    let unit =
+        unit.replace("**", "^").replace('⁻', "-").replace('¹', "1").replace('²', "2").replace('³', "3");
+    let (mut above, mut below) = (Vec::new(), Vec::new());
+    let mut divided = false;
+    for part in unit.split_inclusive(SEPARATORS) {
+        let word = part.trim_end_matches(SEPARATORS);
+        if !word.is_empty() {
+            let base = base(word);
+            let power = word[base.len()..].trim_start_matches('^');
+            let turned = power.starts_with('-');
+            let power = match power.trim_start_matches('-') {
+                "" | "1" => String::new(),
+                digits => format!("^{digits}"),
+            };
+            (if divided == turned { &mut above } else { &mut below }).push(format!("{base}{power}"));
+        }
+        divided = part.ends_with('/') || divided && word.is_empty();
+    }
+    [vec![above.join("·")], below].concat().join("/")
+}
+
+/// Whether a formula adds or subtracts outside of brackets, but for the sign of its first number.
+fn has_a_sum(formula: &str) -> bool {
+    let mut depth = 0_i32;
+    formula.char_indices().any(|(at, c)| {
+        match c {
+            '(' | '[' => depth += 1,
+            ')' | ']' => depth -= 1,
+            _ => {}
+        }
+        at > 0 && depth == 0 && matches!(c, '+' | '-')
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn units_in_other_spellings() {
+        for (text, expected) in [
+            ("kg m^-3", "kg/m^3"),
+            ("kg/m3", "kg/m^3"),
+            ("kg*m**-3", "kg/m^3"),
+            ("g / cm³", "g/cm^3"),
+            ("Pa.s", "Pa·s"),
+            ("m s^-2", "m/s^2"),
+            ("N m", "N·m"),
+            ("mPa s", "mPa·s"),
+        ] {
+            assert_eq!(spelled(text), expected);
+        }
+    }
+}
