@@ -395,7 +395,7 @@ fn unbounded(program: &Program, named: &NamedSolid, solid: &Solid) -> Diagnostic
         }
         () if is_all_but_a_part(solid) => {
             "ω is positive inside, and this one is positive everywhere far away: of a distance that is negative inside, \
-             write `… <= 0`"
+             write `… <= 0`; if all but a part is meant, intersect it with a box"
         }
         () => "intersect it with a box, or mesh it with --box",
     };

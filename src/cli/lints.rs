@@ -3,7 +3,7 @@
 
 use super::failure::note;
 use rfm::diagnostic::{Code, Diagnostic, Diagnostics, Severity, Span};
-use rfm::experiment::{self, Body};
+use rfm::experiment::{self, Body, Taken};
 use rfm::geom::{Aabb, to_thousandths};
 use rfm::glam::DVec3;
 use rfm::ir::Node;
@@ -252,8 +252,8 @@ pub(super) fn of_scenes(
     Ok(found)
 }
 
-/// What there is to say of the place of a fluid before any of its particles is placed: it has no room, or lies outside of the box,
-/// or in obstacles.
+/// What there is to say of the place of a fluid before any of its particles is placed: it has no room, or lies outside of
+/// the box, or in obstacles.
 fn of_fluid(experiment: &Experiment) -> Vec<Diagnostic> {
     let operations = |body: &Body| body.solid.graph(ProgramKind::Value).0.len();
     if experiment.bodies().iter().map(operations).sum::<usize>() > MOST_OPERATIONS {
@@ -268,39 +268,42 @@ fn of_fluid(experiment: &Experiment) -> Vec<Diagnostic> {
     found
 }
 
-/// A warning if a large part of the fluid's shape lies in obstacles, and an error if nothing of it is left. Where obstacles stand
-/// in a fluid that is drawn as if they were not there, as posts in a tank do, they take less.
-fn in_obstacles(scene: &Scene, fluid: &Solid, bodies: &[Solid]) -> Option<Diagnostic> {
+/// What there is to say of the part of a fluid's shape that lies in obstacles, or outside of the container: a warning if it is
+/// large, and an error if nothing is left. Where obstacles stand in a fluid that is drawn as if they were not there, as posts in
+/// a tank do, they take less.
+fn in_obstacles(scene: &Scene, fluid: &Solid, bodies: &[Solid]) -> Vec<Diagnostic> {
     let (container, obstacles) = bodies.split_at(usize::from(scene.container.is_some()).min(bodies.len()));
-    if let Some(taken) =
-        experiment::taken_by_obstacles(fluid, container, &scene.domain).filter(|_| !container.is_empty())
-    {
-        if taken.is_all {
-            return Some(experiment::outside_the_container(scene));
-        }
-        if taken.part > MUCH {
-            let part = 100.0 * taken.part;
-            let message = format!(
-                "{part:.0} % of the fluid's shape lies outside of the container, where no particle is placed"
-            );
-            return Some(
-                Diagnostic::warning(Code::FLUID_IN_OBSTACLE, scene.fluid.shape_span, message)
-                    .help("a container is the room that the fluid may fill, not its walls"),
-            );
-        }
+    let taken_by = |bodies: &[Solid]| {
+        let taken =
+            (!bodies.is_empty()).then(|| experiment::taken_by_obstacles(fluid, bodies, &scene.domain));
+        taken.flatten()
+    };
+    let (outside, within) = (taken_by(container), taken_by(obstacles));
+    let span = scene.fluid.shape_span;
+    if outside.is_some_and(|taken| taken.is_all) {
+        return vec![experiment::outside_the_container(scene)];
     }
-    let taken = experiment::taken_by_obstacles(fluid, obstacles, &scene.domain)?;
-    let (span, help) = (scene.fluid.shape_span, "move the shape of the fluid out of the obstacles");
-    if taken.is_all {
+    let out_of_them = "move the shape of the fluid out of the obstacles";
+    let is_all = |taken: Option<Taken>| taken.is_some_and(|taken| taken.is_all);
+    if is_all(within) || outside.is_some_and(|taken| taken.part > 0.0) && is_all(taken_by(bodies)) {
         let message = "no particle finds room: all of the fluid's shape lies in obstacles";
-        return Some(Diagnostic::error(Code::OBSTACLE_FILLS_BOX, span, message).help(help));
+        return vec![Diagnostic::error(Code::OBSTACLE_FILLS_BOX, span, message).help(out_of_them)];
     }
-    (taken.part > MUCH).then(|| {
-        let part = 100.0 * taken.part;
+    let places = [
+        (
+            outside,
+            "outside of the container",
+            "a container is the room that the fluid may fill, not its walls",
+        ),
+        (within, "in obstacles", out_of_them),
+    ];
+    let told = places.into_iter().filter_map(|(taken, place, help)| {
+        let part = taken.filter(|taken| taken.part > MUCH)?.part;
         let message =
-            format!("{part:.0} % of the fluid's shape lies in obstacles, where no particle is placed");
-        Diagnostic::warning(Code::FLUID_IN_OBSTACLE, span, message).help(help)
-    })
+            format!("{:.0} % of the fluid's shape lies {place}, where no particle is placed", 100.0 * part);
+        Some(Diagnostic::warning(Code::FLUID_IN_OBSTACLE, span, message).help(help))
+    });
+    told.collect()
 }
 
 /// A warning if no fluid can meet an obstacle.

@@ -49,6 +49,7 @@ use clap::FromArgMatches;
 use clap::error::{ContextKind, ContextValue};
 use rfm::diagnostic::{is_hidden, printable};
 use rfm::lower::vocabulary;
+use rfm::quantity::parse_quantity;
 
 use failure::{Failure, note};
 
@@ -100,14 +101,14 @@ fn hint(error: &clap::Error) -> Option<String> {
         let has_unit =
             value.starts_with(|c: char| c.is_ascii_digit()) && value.ends_with(char::is_alphabetic);
         return match argument.split(' ').next()? {
-            "--cells" if has_unit => {
+            "--cells" if has_unit && parse_quantity(value).is_ok() => {
                 Some(format!("--cells counts cells; how large they are is `--cell {value}`"))
             }
             "--what" if ["omega", "ω", "w", "f"].contains(&value) => Some("ω is `--what value`".into()),
             _ => None,
         };
     }
-    if argument.parse::<f64>().is_ok() {
+    if argument.parse::<f64>().is_ok() && std::env::args().any(|flag| flag == "--at") {
         return Some("the numbers of a point are joined by commas, as in `--at 1,2,3`".into());
     }
     let key = argument.strip_prefix("--")?.replace('-', "_");

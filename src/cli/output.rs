@@ -32,9 +32,7 @@ pub(super) fn write(path: &Path, fill: impl FnOnce(&mut dyn Write) -> io::Result
         let mut stream = BufWriter::new(File::options().write(true).open(path).map_err(failed)?);
         return fill(&mut stream).and_then(|()| stream.flush()).map_err(failed);
     }
-    // a link stays a link
-    let linked = path.is_symlink().then(|| path.canonicalize().ok()).flatten();
-    let path = linked.as_deref().unwrap_or(path);
+    let path = &target(path);
     let folder = match path.parent() {
         Some(folder) if !folder.as_os_str().is_empty() => folder,
         _ => Path::new("."),
@@ -58,24 +56,40 @@ pub(super) fn write(path: &Path, fill: impl FnOnce(&mut dyn Write) -> io::Result
     Ok(())
 }
 
-/// Whether something else than a file is there, which a file must not replace: a device (`/dev/null`) or a pipe.
+/// Whether something else than a file is there, which a file must not replace: a device (`/dev/null`), a pipe, or what a
+/// command writes to, whatever that is (`/dev/stdout`).
 fn is_stream(path: &Path) -> bool {
-    path.metadata().is_ok_and(|there| !there.is_file())
+    path.starts_with("/dev") || path.metadata().is_ok_and(|there| !there.is_file())
 }
+
+/// The file that a path means: a link stays a link.
+fn target(path: &Path) -> PathBuf {
+    let mut found = path.to_path_buf();
+    for _ in 0..MOST_LINKS {
+        let Ok(next) = std::fs::read_link(&found) else { break };
+        // from the folder of the link
+        found = found.parent().unwrap_or(Path::new("")).join(next);
+    }
+    found
+}
+
+/// Links that lead to one another.
+const MOST_LINKS: usize = 40;
 
 /// Lets another program write a file: `fill` gets the path of a temporary one, which then takes the place of the file.
 pub(super) fn through(path: &Path, fill: impl FnOnce(&Path) -> Result<(), Failure>) -> Result<(), Failure> {
     let failed = |error: io::Error| Failure::usage(format!("cannot write `{}`: {error}", path.shown()));
-    let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    let to = &target(path);
+    let folder = to.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
     if path.is_dir() || !folder.is_dir() {
         // says what is wrong
         return write(path, |_| Ok(()));
     }
     if is_stream(path) {
         // films are written by programs that look at the ending of a name, and go back to the beginning
-        return Err(failed(io::Error::other("it is no file")));
+        return Err(failed(io::Error::other("a film needs a file")));
     }
-    let name = path.file_name().unwrap_or_default().to_string_lossy();
+    let name = to.file_name().unwrap_or_default().to_string_lossy();
     let ending = path.extension().map(|ending| format!(".{}", ending.to_string_lossy())).unwrap_or_default();
     let prefix = format!("{TEMPORARY}{name}-");
     let temporary =
@@ -83,7 +97,7 @@ pub(super) fn through(path: &Path, fill: impl FnOnce(&Path) -> Result<(), Failur
     let _ = temporary.as_file().try_lock();
     fill(temporary.path())?;
     readable_by_others(temporary.as_file()).map_err(failed)?;
-    temporary.persist(path).map_err(|e| failed(e.error))?;
+    temporary.persist(to).map_err(|e| failed(e.error))?;
     Ok(())
 }
 

@@ -116,7 +116,7 @@ pub(super) fn half_towards_eye(plane: &Plane, camera: &Camera) -> Cut {
     half(axis, plane.value, axis.dot(camera.towards_eye()) < 0.0)
 }
 
-/// How a body is drawn that a plane opens, or leaves as it is, or takes away.
+/// How a body at rest is drawn that a plane opens, or leaves as it is, or takes away.
 pub(super) fn opened_by(cut: Cut, mesh: &Mesh) -> Drawn {
     let beyond = mesh.positions.iter().map(|p| cut.beyond(*p));
     let (least, most) = beyond.fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), x| (a.min(x), b.max(x)));

@@ -264,8 +264,8 @@ place fulfils both comparisons, so the ends are likely exchanged.
     param low = 2 in 0 .. 5
     solid slab = low <= z <= 1 and x^2 + y^2 <= 1";
 FLUID_IN_OBSTACLE = "W0501":
-"Part of the fluid's shape lies inside an obstacle or outside the box. Those particles are carved off before the
-run starts. `rfm check` and editors tell of it where obstacles take more than a quarter of the shape.";
+"Part of the fluid's shape lies inside an obstacle, or outside the box or the container. Those particles are carved off before the
+run starts. `rfm check` and editors tell of it where more than a quarter of the shape is taken.";
 FLUID_OUTSIDE_BOX = "W0504":
 "Part of the fluid's shape lies outside the scene's box. The fluid is filled into the part within the box, so there is
 less of it than the shape says. Make the box larger, move the shape, or cut the shape where the box ends.";

@@ -115,18 +115,21 @@ pub(super) fn stirring(scene: &Scene, parameters: &Parameters) -> Option<Diagnos
     })
 }
 
-/// A warning if a stated speed of sound is so low that the fluid is compressed like a gas: its density changes by the square of
-/// the speed over that of sound.
+/// A warning if a stated speed of sound is so low that the fluid is compressed like a gas: its density changes by the square
+/// of the speed over that of sound.
 pub(super) fn slow_sound(scene: &Scene, parameters: &Parameters) -> Option<Diagnostic> {
     let Method::Wcsph(numbers) = scene.method else { return None };
     let (sound, speed) = (numbers.sound_speed?, parameters.expected_speed);
+    let rounded = |value: f64| format!("{value:.1e}").parse().unwrap_or(value);
     let change = 100.0 * (speed / sound).powi(2);
     (change > MUCH_COMPRESSED).then(|| {
         let message = format!(
-            "sound of {sound:.3} m/s is slow for a fluid that may reach {speed:.2} m/s: its density may change by {change:.0} %"
+            "sound of {} m/s is slow for a fluid that may reach {} m/s: its density may change by {change:.0} %",
+            rounded(sound),
+            rounded(speed)
         );
         Diagnostic::warning(Code::SLOW_SOUND, scene.fluid.shape_span, message)
-            .help(format!("leave `sound_speed` out, or write {:.2} m/s or more", 10.0 * speed))
+            .help(format!("leave `sound_speed` out, or write {} m/s or more", rounded(10.0 * speed)))
     })
 }
 

@@ -182,9 +182,10 @@ impl Experiment {
 
     fn is_covered_by(&self, bodies: &[Body]) -> bool {
         let Ok(bounds) = self.extent() else { return false };
-        samples(&bounds.intersection(&self.scene.domain))
-            .filter(|at| self.fluid.omega(*at) > 0.0)
-            .all(|at| bodies.iter().any(|body| body.solid.omega(at) > 0.0))
+        let within = bounds.intersection(&self.scene.domain);
+        let mut wet = samples(&within).filter(|at| self.fluid.omega(*at) > 0.0).peekable();
+        // a film that no sample meets is not known to be covered
+        wet.peek().is_some() && wet.all(|at| bodies.iter().any(|body| body.solid.omega(at) > 0.0))
     }
 
     /// The size of the box around the fluid's shape within the domain, m.

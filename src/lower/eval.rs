@@ -361,7 +361,7 @@ impl Lowering<'_> {
         if let (Some(low), Some(high)) = ends
             && low > high
         {
-            let message = "no place is between these ends: the first is the greater one";
+            let message = "no place fulfils both comparisons: the ends are exchanged";
             self.report(
                 Diagnostic::warning(Code::REVERSED_CHAIN, span, message)
                     .at(format!("{low} is greater than {high}"))

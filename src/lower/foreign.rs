@@ -205,6 +205,11 @@ fn transformed(name: &str, a: &[&str]) -> Option<Words> {
     Some(Words { what, help: format!("write `{example}`") })
 }
 
+/// Whether an argument is a number or a formula that may be repeated elsewhere: no name is given to it, and it is no point.
+fn is_a_value(argument: &str) -> bool {
+    !argument.contains(['=', '[', ':']) && !["true", "false"].contains(&argument)
+}
+
 /// Standard solids of other tools.
 fn solid(name: &str, a: &[&str]) -> Option<Words> {
     let size = a.first().filter(|text| text.starts_with('['));
@@ -214,14 +219,14 @@ fn solid(name: &str, a: &[&str]) -> Option<Words> {
             let corners = match a {
                 [size] if size.starts_with('[') => size.split_once(',').map(|(w, h)| [inner(w), inner(h)]),
                 [side] => Some([side, side].map(|side| inner(side))),
-                [w, h] if !w.starts_with('[') => Some([w, h].map(|side| inner(side))),
+                [w, h] if [w, h].iter().all(|text| is_a_value(text)) => Some([w, h].map(|side| inner(side))),
                 _ => None,
             };
             let [w, h] = corners.unwrap_or_else(|| ["2", "1"].map(String::from));
             written("`polygon` here", &format!("polygon([[0, 0], [{w}, 0], [{w}, {h}], [0, {h}]])"))
         }
         "cube" | "cuboid" | "Box" | "block" | "brick" | "aabb" => match (a, size) {
-            ([_, "true"], Some(size)) => {
+            ([_, centred], Some(size)) if centred.ends_with("true") => {
                 written("`box(min, max)` here", &format!("box(-{size}/2, {size}/2)"))
             }
             (_, Some(size)) => written("`box(min, max)` here", &format!("box([0, 0, 0], {size})")),
@@ -241,7 +246,11 @@ fn solid(name: &str, a: &[&str]) -> Option<Words> {
             &if name == "pipe" || name == "tube" {
                 "cylinder(0.5, 1) \\ cylinder(0.4, 1)".into()
             } else {
-                format!("cylinder({}, {})", a.first().unwrap_or(&"0.5"), a.get(1).unwrap_or(&"1"))
+                match a {
+                    [r, h] if is_a_value(r) && is_a_value(h) => format!("cylinder({r}, {h})"),
+                    [r] if is_a_value(r) => format!("cylinder({r}, 1)"),
+                    _ => "cylinder(0.5, 1)".into(),
+                }
             },
         ),
         "frustum" => match a {

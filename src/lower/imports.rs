@@ -8,6 +8,7 @@ use super::value::Value;
 use crate::diagnostic::{Code, Diagnostic, Source, SourceId, Span};
 use crate::files::Files;
 use crate::ir::{Axis, Expr as Operation, Lookup, Part};
+use crate::quantity::parse_unit;
 use crate::syntax::Ast;
 use crate::syntax::ast::{Argument, Expr, ExprKind, Import, Name};
 use crate::table::Table;
@@ -68,7 +69,9 @@ impl<'a> Lowering<'a> {
             }
             let message = format!("{} has no part `{}`", value.describe(), name.text);
             let diagnostic = Diagnostic::error(Code::WRONG_TYPE, name.span, message);
-            if let ExprKind::Quantity { unit, .. } = &of.kind {
+            if let ExprKind::Quantity { unit, .. } = &of.kind
+                && parse_unit(&name.text).is_some()
+            {
                 let units = format!("the parts of a unit are joined by `·`: `{}·{}`", unit.text, name.text);
                 return self.fail(diagnostic.help(format!("{units}; a viscosity may also be in `kg/m/s`")));
             }

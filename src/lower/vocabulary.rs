@@ -50,10 +50,14 @@ pub fn keys(block: Option<&str>, method: Method) -> Vec<&'static str> {
     keys
 }
 
-/// Whether scenes, or blocks in them that are not repeated, have a key of this name with any method.
+/// Whether the fluid, the solver or the run of a scene has a key of this name, with any method, whose value is a number.
 pub fn is_key(name: &str) -> bool {
-    const BLOCKS: [Option<&str>; 4] = [None, Some("fluid"), Some("solver"), Some("run")];
-    Method::all().into_iter().any(|method| BLOCKS.iter().any(|block| keys(*block, method).contains(&name)))
+    const BLOCKS: [Option<&str>; 3] = [Some("fluid"), Some("solver"), Some("run")];
+    let is_number = name != "shape" && words(name).is_empty();
+    is_number
+        && Method::all()
+            .into_iter()
+            .any(|method| BLOCKS.iter().any(|block| keys(*block, method).contains(&name)))
 }
 
 /// The words that a key takes as its value; none if it takes a number, a name or an expression.

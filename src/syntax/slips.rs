@@ -196,11 +196,12 @@ impl<'t> Slip<'t> {
         let open = opening(before)?;
         let name = last_word(&before[..open]);
         let shape = format!("{}({})", self.found, bracketed(self.after())?);
-        if before[..open].strip_suffix(name).is_some_and(|heads| heads.ends_with('.')) {
+        let follows_a_method = before[..open].strip_suffix(name).is_some_and(|heads| heads.ends_with('.'));
+        if follows_a_method && foreign::method(self.found).is_some() {
             let written = if fits(&[&shape]) { shape } else { format!("{}(…)", self.found) };
             return Some(self.unexpected().help(format!("a method follows a point: write `.{written}`")));
         }
-        let method = foreign::method(name)?;
+        let method = foreign::method(name).filter(|_| !follows_a_method)?;
         let arguments = &before[open + 1..before.len() - 1];
         let written = match (fits(&[&shape, arguments]), foreign::method_call(name, arguments)) {
             (true, Some(call)) => format!("{shape}{call}"),

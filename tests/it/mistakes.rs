@@ -94,6 +94,8 @@ const WORDS: &[&str] = &[
     "solid s = import(\"part.stl\")",
     "import part.stl",
     "solid box = sphere(1)\nsolid s = box([0, 0, 0], [1, 1, 1])",
+    "solid s = square(10, center=true)",
+    "solid s = cube([1, 2, 3], center=true)",
 ];
 
 /// Choices, lists, maps of space, profiles and joints.
@@ -198,6 +200,7 @@ const SIGNS: &[&str] = &[
     "solid my-part = sphere(1)",
     "solid s = (x - 1)^2 + (y - 1)^2 = 4 and 0 <= z <= 1",
     "solid s = box().move([1, 0, 0]) move([0, 1, 0])",
+    "solid s = box().move([1, 0, 0]) sphere(1)",
 ];
 
 /// Arguments, angles, lengths, and what is rarely meant.
@@ -253,6 +256,11 @@ const VALUES: &[&str] = &[
     "solid s = sphere(1/2 inch)",
     "solid s = 5 <= z <= 2 and sphere(3)",
     "solid s = box().rotate_z(3000 rpm*t)",
+    "let h = 2\nsolid s = cylinder(1 h)",
+    "let r = 1\nlet h = 2\nsolid s = cylinder(r h)",
+    "param n = 2\nsolid s = sphere(1 cm + n mm)",
+    "let d = 2 in 0 .. 5\nsolid s = sphere(d)",
+    "solid s = 2 >= z >= 5",
 ];
 
 /// The scene that a line of [`SCENES`] changes: a line replaces the one with its key, or is added.
@@ -346,6 +354,9 @@ const SCENES: &[&str] = &[
     "\"box\": { \"max\": [1, 1, 1] }",
     "container { solid: post }",
     "fluid { shape: 5, spacing: 5 cm }",
+    "fluid { shape: ball([0.5, 0.5, 0.7], 0.2), spacing: 2*width; }",
+    "box { max: [1, 2 3] }",
+    "fluid { shape: ball([0.5, 0.5, 0.7], 0.2), spacing: 5 cm, density: 1 000 }",
 ];
 
 fn program(text: &str) -> Result<Program, Diagnostics> {

@@ -25,6 +25,8 @@ pub(super) struct Bodies {
     meshes: Vec<Mesh>,
     /// Particles of the first frame.
     samples: Vec<DVec3>,
+    /// Whether they stay where they are.
+    stand: bool,
 }
 
 impl Bodies {
@@ -47,7 +49,8 @@ impl Bodies {
         let points: Vec<DVec3> = points.map(|(points, _)| points).unwrap_or_default();
         let finite: Vec<DVec3> = points.into_iter().filter(|p| p.is_finite()).collect();
         let every = finite.len().div_ceil(MOST_SAMPLES).max(1);
-        Ok(Self { names, are_named, meshes, samples: finite.into_iter().step_by(every).collect() })
+        let samples = finite.into_iter().step_by(every).collect();
+        Ok(Self { names, are_named, meshes, samples, stand: others.len() <= 1 })
     }
 
     /// How each of them is drawn.
@@ -77,6 +80,8 @@ impl Bodies {
             }
             _ if is_glass(name) => Drawn::Glass(None),
             Some(CutFlag::None) => Drawn::Whole,
+            // where bodies that move will be is not looked up
+            Some(CutFlag::Plane(plane)) if !self.stand => Drawn::Open(half_towards_eye(plane, camera)),
             Some(CutFlag::Plane(plane)) => opened_by(half_towards_eye(plane, camera), mesh),
             Some(CutFlag::Auto) | None => out_of_the_way(camera, name, mesh, &self.samples),
         };

@@ -15,6 +15,7 @@ use super::super::{Failure, output};
 use crate::cli::output::Shown;
 use crate::cli::render::Surface;
 use crate::cli::scenery::{self, Drawn, half, out_of_the_way};
+use rfm::experiment;
 use rfm::field::Walls;
 use rfm::fluid_surface::Reconstruction;
 use rfm::geom::Aabb;
@@ -242,14 +243,16 @@ fn opened(look: Look<'_>, experiment: &Experiment, meshes: &[Mesh]) -> Result<Ve
         (Some(CutFlag::Auto), _) | (None, Opening::Automatic) => None,
     };
     let samples = if fixed.is_none() { fluid_samples(experiment) } else { Vec::new() };
-    let drawn = |(name, mesh): (&&str, &Mesh)| match fixed {
+    let drawn = |((name, body), mesh): ((&&str, &experiment::Body), &Mesh)| match fixed {
         _ if is_hidden(name) => Drawn::Hidden,
         _ if is_glass(name) => Drawn::Glass(fixed.flatten()),
         Some(None) => Drawn::Whole,
+        // where a body that moves will be is not known yet
+        Some(Some(cut)) if body.solid.moves() => Drawn::Open(cut),
         Some(Some(cut)) => scenery::opened_by(cut, mesh),
         None => out_of_the_way(&small, name, mesh, &samples),
     };
-    Ok(names.iter().zip(meshes).map(drawn).collect())
+    Ok(names.iter().zip(experiment.bodies()).zip(meshes).map(drawn).collect())
 }
 
 /// Points of the fluid as it is at the start.

@@ -311,7 +311,13 @@ impl<'a> Lowering<'a> {
                 if parsed.dimension != expected {
                     let message = format!("`{}` is not a unit of `{key}`", unit.text);
                     let help = match expected.unit() {
-                        Some(_) if key == "viscosity" && unit.text.starts_with("m^2/s") => DYNAMIC.into(),
+                        Some(_)
+                            if key == "viscosity"
+                                && parse_unit("m^2/s")
+                                    .is_some_and(|kinematic| kinematic.dimension == parsed.dimension) =>
+                        {
+                            DYNAMIC.into()
+                        }
                         Some(unit) => format!("write for example `1 {unit}`"),
                         None => format!("`{key}` has no unit"),
                     };

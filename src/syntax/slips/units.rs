@@ -17,6 +17,10 @@ impl Slip<'_> {
         if foreign::is_letter_of_type(word) {
             return unknown.help(format!("numbers have no type: write `{number}`"));
         }
+        let is_range = || self.after().lines().next().is_some_and(|rest| rest.contains(".."));
+        if word == "in" && is_range() {
+            return unknown.help("only a param has a range, as in `param d = 2 in 0 .. 5`");
+        }
         if let Some(written) = foreign::quantity(number, word) {
             let line = self.on_its_line().trim_end();
             let before = line.strip_suffix(number).unwrap_or(line);
@@ -41,19 +45,36 @@ impl Slip<'_> {
     /// `n mm`, `(1 + n) mm`: a unit behind something that is no number.
     pub(super) fn unit_of_a_formula(&self, before: &str, unit: &str, span: Span) -> Option<Diagnostic> {
         parse_unit(unit)?;
+        // names stand in front of a `=`
+        if !before.contains(['=', ':']) || before.trim_start().starts_with("fn ") && !before.contains('=') {
+            return None;
+        }
+        // within shapes an hour or a gram is more likely a name
+        if !self.in_braces() && unit.chars().count() == 1 && unit != "m" {
+            return None;
+        }
         let value = last_part(before).trim();
-        let (value, is_sum) = if fits(&[value]) { (value, has_a_sum(value)) } else { ("n", false) };
-        let written = if is_sum { format!("({value})*1 {unit}") } else { format!("{value}*1 {unit}") };
-        let message = "a unit stands behind a number";
-        Some(Diagnostic::error(Code::SYNTAX, span, message).help(format!("write `{written}`")))
+        let value = if fits(&[value]) { value } else { "n" };
+        let is_sum = has_a_sum(value);
+        // of a sum in which another part has its unit, the last one is meant
+        let has_units = value.split_whitespace().any(|word| parse_unit(word).is_some());
+        let written = match (is_sum, has_units) {
+            (true, true) => format!("… + {}*1 {unit}", value.rsplit(['+', '-']).next().unwrap_or("n").trim()),
+            (true, false) => format!("({value})*1 {unit}"),
+            (false, _) => format!("{value}*1 {unit}"),
+        };
+        let diagnostic = Diagnostic::error(Code::SYNTAX, span, "a unit stands behind a number");
+        // a letter may be a name as well
+        let or = if unit.chars().count() == 1 { "; or is a comma or a sign missing?" } else { "" };
+        Some(diagnostic.help(format!("write `{written}`{or}")))
     }
 
-    /// `viscosity: 1 cP }`, `1000 kg m^-3`: what follows the number is no unit, or goes on behind one, so the grammar takes it for
-    /// the next key.
+    /// `viscosity: 1 cP }`, `1000 kg m^-3`: what follows the number is no unit, or goes on behind one, so the grammar takes
+    /// it for the next key.
     pub(super) fn unit_taken_for_a_key(&self) -> Option<Diagnostic> {
         let line = self.on_its_line().trim_end();
         let word = last_word(line);
-        if !self.in_braces() || matches!(self.found, ":" | "{") || word.is_empty() {
+        if !self.in_braces() || matches!(self.found, ":" | "{" | "=" | "[") || word.is_empty() {
             return None;
         }
         let line_start = self.at - self.on_its_line().len();
@@ -74,17 +95,18 @@ impl Slip<'_> {
         let (number, unit) = value[number..].split_at(number_length);
         let start = line_start + value_start + value.len() - unit.trim_start().len();
         let unit = unit.trim();
-        if unit.is_empty() || parse_unit(unit).is_some() || !fits(&[unit]) {
+        let is_word = unit.starts_with(|c: char| c.is_alphabetic() || c == '°');
+        if !is_word || parse_unit(unit).is_some() || !fits(&[unit]) {
             return None;
         }
         // of several words each must be a unit: what follows one may be the next key
         let words: Vec<&str> = unit.split(SEPARATORS).filter(|word| !word.is_empty()).collect();
         let is_unit = |word: &&str| {
             let base = base(word);
-            parse_unit(base).is_some() || foreign::quantity("1", base).is_some()
+            !base.is_empty() && (parse_unit(base).is_some() || foreign::quantity("1", base).is_some())
         };
-        let is_word = |c: char| c.is_alphanumeric() || c == '_' || c == '°';
-        if !words.iter().all(|word| base(word).chars().all(is_word))
+        let is_part = |c: char| c.is_alphanumeric() || c == '_' || c == '°';
+        if !words.iter().all(|word| base(word).chars().all(is_part))
             || words.len() > 1 && !words.iter().all(is_unit)
         {
             return None;
@@ -147,6 +169,9 @@ fn spelled(unit: &str) -> String {
             (if divided == turned { &mut above } else { &mut below }).push(format!("{base}{power}"));
         }
         divided = part.ends_with('/') || divided && word.is_empty();
+    }
+    if above.is_empty() {
+        return below.iter().map(|part| format!("{part}^-1")).collect::<Vec<_>>().join("·");
     }
     [vec![above.join("·")], below].concat().join("/")
 }

@@ -142,6 +142,9 @@ fn read_only(array: Bound<'_, PyAny>) -> PyResult<Py<PyAny>> {
     Ok(array.unbind())
 }
 
+/// Links that lead to one another.
+const MOST_LINKS: usize = 40;
+
 /// Writes a file under another name first, so that it is whole or not there.
 ///
 /// # Errors
@@ -155,13 +158,19 @@ pub fn write_file(
     // a folder that does not exist is better found here than behind the name of a temporary file
     std::fs::metadata(folder).map_err(failed)?;
     // a device or a pipe (/dev/null) is written as it stands: a file must not take its place
-    if std::fs::metadata(path).is_ok_and(|there| !there.is_file() && !there.is_dir()) {
+    let is_stream = path.starts_with("/dev")
+        || std::fs::metadata(path).is_ok_and(|there| !there.is_file() && !there.is_dir());
+    if is_stream {
         let mut out = BufWriter::new(std::fs::File::options().write(true).open(path).map_err(failed)?);
         return fill(&mut out).and_then(|()| out.flush()).map_err(failed);
     }
-    // a link stays a link
-    let linked = path.is_symlink().then(|| path.canonicalize().ok()).flatten();
-    let path = linked.as_deref().unwrap_or(path);
+    // a link stays a link, also one to a file that is not there yet
+    let mut linked = path.to_path_buf();
+    for _ in 0..MOST_LINKS {
+        let Ok(next) = std::fs::read_link(&linked) else { break };
+        linked = linked.parent().unwrap_or(Path::new("")).join(next);
+    }
+    let path = linked.as_path();
     let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
     let mut temporary = tempfile::Builder::new();
     temporary.prefix(".rfm-");

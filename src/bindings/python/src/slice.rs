@@ -162,7 +162,7 @@ impl PySlice {
                 )));
             }
         };
-        write_file(&path, |out| out.write_all(&picture))
+        py.detach(|| write_file(&path, |out| out.write_all(&picture)))
     }
 
     fn __repr__(&self) -> String {
