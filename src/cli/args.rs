@@ -152,6 +152,12 @@ pub(super) struct Check {
     /// Draw the plot in the terminal
     #[arg(long, requires = "slice", conflicts_with = "json")]
     pub term: bool,
+    /// What the plot shows: ω, or the distance from the surface, of a mesh with 192 cells
+    #[arg(long, value_enum, default_value_t = Plotted::Omega, hide_possible_values = true, value_name = "omega|distance", requires = "slice")]
+    pub plot: Plotted,
+    /// Arrows along −∇ω, the way out of the solid
+    #[arg(long, requires = "slice")]
+    pub arrows: bool,
     /// Part of the plane to plot: u0,v0,u1,v1 [default: around the solid]
     #[arg(long, value_name = "U0,V0,U1,V1", value_parser = window, allow_hyphen_values = true, requires = "slice")]
     pub window: Option<[f64; 4]>,
@@ -177,6 +183,15 @@ pub(super) struct Check {
     pub sweep: SweepOptions,
     #[command(flatten)]
     pub again: Again,
+}
+
+/// What a slice shows.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub(super) enum Plotted {
+    /// The value of the formula
+    Omega,
+    /// The distance from the surface, positive inside
+    Distance,
 }
 
 /// How messages are written.

@@ -5,19 +5,24 @@ use std::path::{Path, PathBuf};
 
 use glam::{DVec2, DVec3};
 
-use super::args::{Check, MessageFormat, Shared};
-use super::failure::Failure;
+use super::args::{Check, MessageFormat, Plotted, Shared};
+use super::failure::{Failure, note};
+use super::mesh::hidden;
 use super::output::Shown;
 use super::{choose, output};
 use rfm::diagnostic::{Code, Diagnostic, Span};
 use rfm::field::Field;
 use rfm::geom::Aabb;
-use rfm::slice::{self, Cut as SolidCut, Panel, Plane, Window};
+use rfm::mesh::{Grid, MeshDistance, Resolution, dual_contouring, marching_cubes, thin_cells};
+use rfm::slice::{self, Cut as SolidCut, Panel, Plane, Quantity, Style, Window};
 use rfm::solid::{Bounds, Chosen};
 use rfm::{Program, Solid};
 
 /// Points along each side of the window at which a section is sought.
 const SOUGHT: usize = 200;
+
+/// Cells along the longest side of the mesh from which distances are measured.
+const CELLS_OF_DISTANCE: usize = 192;
 
 /// How far beside its plane a section is looked at, as a part of the window: less than a pixel.
 const BESIDE: f64 = 1e-5;
@@ -33,8 +38,17 @@ pub(super) fn plot(shared: &Shared, options: &Check, program: &Program) -> Resul
     };
     let solid = |name: &Option<&str>| Ok(choose::solid(shared, program, *name)?.at(options.time));
     let solids = names.iter().map(solid).collect::<Result<Vec<Solid>, Failure>>()?;
+    let is_plain = style(options) == Style::default();
+    if !is_plain && solids.len() > 1 {
+        return Err(Failure::usage(
+            "--plot distance and --arrows show one solid: several are drawn as sections",
+        ));
+    }
+    if !is_plain && options.term {
+        return Err(Failure::usage("--term draws ω without arrows: write a picture with -o"));
+    }
     match (&options.slice[..], &solids[..]) {
-        ([plane], [solid]) => plot_one(shared, options, program, (solid, *plane)),
+        ([plane], [solid]) if is_plain => plot_one(shared, options, program, (solid, *plane)),
         (planes, solids) => plot_sheet(shared, options, program, (solids, planes)),
     }
 }
@@ -115,7 +129,7 @@ fn plot_one(
     }
     let path = match &options.output {
         Some(path) => path.clone(),
-        None => PathBuf::from(format!("{}.{}.svg", solid.name(), plane.to_string().replace(' ', ""))),
+        None => own_name(solid, plane),
     };
     let picture = picture(field, title, plane, window, &path)?;
     output::write(&path, |out| out.write_all(&picture))?;
@@ -123,6 +137,67 @@ fn plot_one(
         say!("slice {plane} of {} written to {}", solid.name(), path.shown());
     }
     Ok(warnings)
+}
+
+/// How the flags ask for a slice to be drawn.
+fn style(options: &Check) -> Style {
+    let quantity = match options.plot {
+        Plotted::Omega => Quantity::Omega,
+        Plotted::Distance => Quantity::Distance,
+    };
+    Style { quantity, arrows: options.arrows }
+}
+
+/// The name of a slice's file if none is stated.
+fn own_name(solid: &Solid, plane: Plane) -> PathBuf {
+    PathBuf::from(format!("{}.{}.svg", solid.name(), plane.to_string().replace(' ', "")))
+}
+
+/// The distance from the surface of a solid, m, positive inside: that from a fine mesh of it.
+struct Depth {
+    name: String,
+    distance: MeshDistance,
+}
+
+impl Depth {
+    fn of(solid: &Solid) -> Result<Self, Failure> {
+        let name = solid.name();
+        let bounds = solid.bounds().aabb().filter(|bounds| !bounds.is_empty()).ok_or_else(|| {
+            Failure::usage(format!("--plot distance measures from a mesh of `{name}`, which has no bounds: intersect it with a box"))
+        })?;
+        let refused = |error: &dyn std::fmt::Display| {
+            Failure::usage(format!("--plot distance, a mesh of `{name}`: {error}"))
+        };
+        let grid =
+            Grid::around(&bounds, Resolution::Cells(CELLS_OF_DISTANCE)).map_err(|error| refused(&error))?;
+        let surface = solid.surface(*grid.bounds());
+        let sharp = dual_contouring(&*surface, &grid, &|_| {}).map_err(|error| refused(&error))?;
+        let thin = thin_cells(&*surface, &grid).map_err(|error| refused(&error))?;
+        if thin.count > 0 {
+            note(format!(
+                "distances are measured from a mesh of `{name}`, which misses what is thinner than a cell {}",
+                hidden(&thin, &grid)
+            ));
+        }
+        let name = name.to_string();
+        if let Ok(distance) = MeshDistance::of(&sharp) {
+            return Ok(Self { name, distance });
+        }
+        // one without sharp edges never touches itself
+        let plain = marching_cubes(&*surface, &grid, &|_| {}).map_err(|error| refused(&error))?;
+        let distance = MeshDistance::of(&plain).map_err(|error| refused(&error))?;
+        Ok(Self { name, distance })
+    }
+}
+
+impl Field for Depth {
+    fn omega(&self, p: DVec3) -> f64 {
+        self.distance.at(p).0
+    }
+
+    fn omega_grad(&self, p: DVec3) -> (f64, DVec3) {
+        self.distance.at(p)
+    }
 }
 
 /// Plots several planes, or several solids, or both, in one drawing.
@@ -140,6 +215,13 @@ fn plot_sheet(
             "--window states a part of a plane, and these planes lie across different axes: plot them one by one",
         ));
     }
+    let style = style(options);
+    let depths: Vec<Option<Depth>> = match style.quantity {
+        Quantity::Omega => solids.iter().map(|_| None).collect(),
+        Quantity::Distance => {
+            solids.iter().map(|solid| Depth::of(solid).map(Some)).collect::<Result<_, _>>()?
+        }
+    };
     let chosen: Vec<_> =
         solids.iter().map(|solid| program.within_tolerance(solid).and_then(Result::ok)).collect();
     let mut all = Vec::new();
@@ -153,12 +235,25 @@ fn plot_sheet(
         .map(|(plane, window, seen)| Panel {
             plane: *plane,
             window: *window,
-            cuts: seen.iter().map(Seen::cut).collect(),
+            style,
+            cuts: seen
+                .iter()
+                .zip(&depths)
+                .map(|(seen, depth)| match depth {
+                    // the plane itself is drawn: a distance within a face is 0
+                    Some(depth) => SolidCut { name: depth.name.clone(), field: depth },
+                    None => seen.cut(),
+                })
+                .collect(),
         })
         .collect();
-    let path = options.output.clone().unwrap_or_else(|| PathBuf::from("slices.svg"));
+    let path = options.output.clone().unwrap_or_else(|| match (planes, solids) {
+        ([plane], [solid]) => own_name(solid, *plane),
+        _ => PathBuf::from("slices.svg"),
+    });
     let names: Vec<&str> = solids.iter().map(Solid::name).collect();
-    let (title, samples, mut bytes) = (names.join(", "), slice::DEFAULT_SAMPLES, Vec::new());
+    let (title, mut bytes) = (names.join(", "), Vec::new());
+    let samples = slice::DEFAULT_SAMPLES;
     match output::Picture::of(&path)? {
         output::Picture::Svg => slice::write_sheet_svg(&title, &panels, samples, &mut bytes),
         output::Picture::Png => slice::write_sheet_png(&title, &panels, samples, 2.0, &mut bytes),

@@ -2,10 +2,10 @@
 //!
 //! Invariant: a surface that names the frame it was made of is only taken for that frame.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, HashMap};
 use std::path::{Path, PathBuf};
 
-use super::failure::Failure;
+use super::failure::{Failure, note};
 use super::output::{self, Shown};
 use super::saved;
 use rfm::fluid_surface::FrameEntry;
@@ -71,39 +71,98 @@ fn checksum(bytes: &[u8]) -> String {
     blake3::hash(bytes).to_hex().to_string()
 }
 
+/// Why a frame has no surface.
+enum Missing {
+    /// None is listed for its time, or the file is gone.
+    NotThere,
+    /// The one that is there was made of another frame.
+    OfAnother(PathBuf),
+}
+
+/// The surfaces that a folder lists.
+struct Surfaces<'a> {
+    run: &'a Path,
+    folder: PathBuf,
+    known: HashMap<u64, FrameEntry>,
+    origins: Origins,
+}
+
+impl<'a> Surfaces<'a> {
+    /// Reads the list; `None` if there is none.
+    fn of(run: &'a Path) -> Result<Option<Self>, Failure> {
+        let folder = run.join(FOLDER);
+        let list = folder.join(LIST);
+        if !list.is_file() {
+            return Ok(None);
+        }
+        let (known, origins) = (saved::by_time(saved::listed(&list)?), Origins::read(&folder));
+        Ok(Some(Self { run, folder, known, origins }))
+    }
+
+    fn of_frame(&self, entry: &FrameEntry) -> Result<Result<PathBuf, Missing>, Failure> {
+        let known = self.known.get(&entry.time.to_bits());
+        let Some(surface) = known.filter(|surface| self.folder.join(&surface.file).is_file()) else {
+            return Ok(Err(Missing::NotThere));
+        };
+        let path = self.folder.join(&surface.file);
+        let fits = self.origins.fits(&surface.file, &self.run.join(&entry.file))?;
+        Ok(if fits { Ok(path) } else { Err(Missing::OfAnother(path)) })
+    }
+}
+
 /// The surfaces of these frames of a run.
 pub(super) fn of_frames(run: &Path, entries: &[(usize, FrameEntry)]) -> Result<Vec<PathBuf>, Failure> {
-    let folder = run.join(FOLDER);
-    let list = folder.join(LIST);
     let made_by = format!("`rfm mesh {} --fluid` makes them", run.shown());
-    if !list.is_file() {
+    let Some(surfaces) = Surfaces::of(run)? else {
         return Err(Failure::usage(format!(
             "--surface: there are no surfaces of the fluid in `{}`: {made_by}",
-            folder.shown()
+            run.join(FOLDER).shown()
         )));
-    }
-    let known = saved::by_time(saved::listed(&list)?);
-    let origins = Origins::read(&folder);
-    let of_frame = |(number, entry): &(usize, FrameEntry)| {
-        let found = known.get(&entry.time.to_bits()).filter(|surface| folder.join(&surface.file).is_file());
-        let Some(surface) = found else {
-            return Err(Failure::usage(format!(
-                "--surface: frame {number}, at {} s, has no surface in `{}`: {made_by}, and --frames chooses others",
-                entry.time,
-                list.shown()
-            )));
-        };
-        let path = folder.join(&surface.file);
-        if !origins.fits(&surface.file, &run.join(&entry.file))? {
-            return Err(Failure::usage(format!(
-                "--surface: `{}` was made of another run than frame {number}, at {} s: {made_by} anew",
-                path.shown(),
-                entry.time
-            )));
-        }
-        Ok(path)
+    };
+    let of_frame = |(number, entry): &(usize, FrameEntry)| match surfaces.of_frame(entry)? {
+        Ok(path) => Ok(path),
+        Err(Missing::NotThere) => Err(Failure::usage(format!(
+            "--surface: frame {number}, at {} s, has no surface in `{}`: {made_by}, and --frames chooses others",
+            entry.time,
+            surfaces.folder.join(LIST).shown()
+        ))),
+        Err(Missing::OfAnother(path)) => Err(Failure::usage(format!(
+            "--surface: `{}` was made of another run than frame {number}, at {} s: {made_by} anew",
+            path.shown(),
+            entry.time
+        ))),
     };
     entries.iter().map(of_frame).collect()
+}
+
+/// The surfaces of these frames of a run as far as there are any. Notes which were made of other frames.
+pub(super) fn there_are(
+    run: &Path,
+    entries: &[(usize, FrameEntry)],
+) -> Result<Vec<Option<PathBuf>>, Failure> {
+    let Some(surfaces) = Surfaces::of(run)? else { return Ok(vec![None; entries.len()]) };
+    let (mut found, mut others) = (Vec::new(), 0);
+    for (_, entry) in entries {
+        found.push(match surfaces.of_frame(entry)? {
+            Ok(path) => Some(path),
+            Err(Missing::NotThere) => None,
+            Err(Missing::OfAnother(_)) => {
+                others += 1;
+                None
+            }
+        });
+    }
+    if others > 0 {
+        note(format!(
+            "{} of the fluid in `{}` {} made of another run and {} not shown: `rfm mesh {} --fluid` makes them anew",
+            output::counted(others, "surface"),
+            surfaces.folder.shown(),
+            if others == 1 { "was" } else { "were" },
+            if others == 1 { "is" } else { "are" },
+            run.shown()
+        ));
+    }
+    Ok(found)
 }
 
 /// Removes the surfaces that an earlier run has left in the folder of a run, and nothing else.

@@ -302,7 +302,8 @@ LONG_STEP = "W0503":
 they never become so fast; without `dt` a stable step is derived.";
 ENERGY_GREW = "W0511":
 "The run's energy rose by more than 1 % above what it had at the start and gravity's work since then; where walls move, above
-what was left of that and their work, by more than 1 % of the greatest energy so far. No fluid does that: the method made energy
+what was left of that and their work, by more than 1 % of the greatest energy so far; or, where no wall moves, by more than 0.2 % of
+it and a quarter of the greatest energy of motion, as a low wave that grows does. No fluid does that: the method made energy
 of its errors. What moves faster or higher than it could is wrong from then on. More particles, more `artificial_viscosity`
 (wcsph), or the other method may help; `energy_excess` in the summary has the largest value, and the probe `audit` shows when it
 arose. A run whose energy doubles stops, unless walls move.";

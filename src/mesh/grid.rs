@@ -131,13 +131,16 @@ impl Grid {
         Ok(grid)
     }
 
+    /// What reaches no farther out of a box than this, in its longest sides, counts as within it.
+    pub const BESIDE: f64 = 1e-3;
+
     /// A grid for what of a solid's bounds lies in a box: around the bounds, or filling the part in the box if that
     /// is smaller.
     ///
     /// # Errors
     /// [`GridError`] if the boxes or the resolution are unusable.
     pub fn within(bounds: &Aabb, domain: &Aabb, resolution: Resolution) -> Result<Self, GridError> {
-        let over = bounds.intersection(&domain.grown(1e-3 * domain.size().max_element()));
+        let over = bounds.intersection(&domain.grown(Self::BESIDE * domain.size().max_element()));
         if *bounds == over || over.is_empty() {
             Self::around(bounds, resolution)
         } else {

@@ -41,6 +41,7 @@ mod check;
 mod collapse;
 mod crossings;
 mod diagonals;
+mod distance;
 mod dual;
 mod extract;
 mod formats;
@@ -65,7 +66,10 @@ use std::fmt;
 
 use glam::DVec3;
 
+use crate::geom::Placement;
+
 pub use check::{Report, check, is_closed_manifold};
+pub use distance::MeshDistance;
 pub use dual::dual_contouring;
 pub use extract::marching_cubes;
 pub use formats::*;
@@ -101,6 +105,46 @@ impl Mesh {
     /// The largest number of vertices of a mesh. The corners of twice as many triangles then still have
     /// 32-bit numbers, and indices fit the signed 32 bits of PLY and VTP files.
     pub const MAX_VERTICES: usize = 1 << 29;
+
+    /// The mesh of a body that is elsewhere.
+    #[must_use]
+    pub fn moved(&self, to: &Placement) -> Self {
+        Self {
+            positions: self.positions.iter().map(|p| to.apply(*p)).collect(),
+            normals: self.normals.iter().map(|n| to.rotation * *n).collect(),
+            triangles: self.triangles.clone(),
+            caps: self.caps.clone(),
+            work: self.work,
+        }
+    }
+
+    /// The parts of a mesh, told apart by a whole number from 0 to `count` − 1 at each vertex; `None` if numbers are
+    /// missing or others, or a triangle has corners in several parts.
+    pub fn divided(&self, part_of: &[f64], count: usize) -> Option<Vec<Self>> {
+        if part_of.len() != self.positions.len() || self.normals.len() != self.positions.len() {
+            return None;
+        }
+        let mut parts = vec![Self::default(); count];
+        // the number of each vertex within its part
+        let mut numbers = Vec::with_capacity(self.positions.len());
+        for (k, &part) in part_of.iter().enumerate() {
+            if !(part >= 0.0 && part.fract() == 0.0) {
+                return None;
+            }
+            let own = parts.get_mut(part as usize)?;
+            numbers.push(own.positions.len() as u32);
+            own.positions.push(self.positions[k]);
+            own.normals.push(self.normals[k]);
+        }
+        for triangle in &self.triangles {
+            let [a, b, c] = triangle.map(|vertex| part_of[vertex as usize] as usize);
+            if a != b || b != c {
+                return None;
+            }
+            parts[a].triangles.push(triangle.map(|vertex| numbers[vertex as usize]));
+        }
+        Some(parts)
+    }
 
     /// Meshes as one: their vertices and triangles one after the other.
     pub fn joined(meshes: &[Self]) -> Self {

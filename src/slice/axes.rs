@@ -6,13 +6,18 @@ use std::fmt::Write;
 
 use glam::DVec2;
 
-use super::{Plane, Window, numbers::ticks};
+use super::{
+    Plane, Window,
+    numbers::{Decimal, ticks, written},
+};
 
 /// The longest sides of the plotted area.
 const MAX_SIZE: DVec2 = DVec2::new(560.0, 460.0);
 /// A long thin window is stretched to this rather than drawn as a line.
 const MIN_SIDE: f64 = 60.0;
 const TICK: f64 = 5.0;
+/// The width of a digit of a number at a tick.
+const LETTER: f64 = 6.6;
 /// Room for one label on the horizontal and on the vertical axis.
 const LABEL_SPACING: DVec2 = DVec2::new(46.0, 36.0);
 
@@ -55,15 +60,22 @@ pub fn draw(out: &mut String, frame: &PlotFrame, plane: Plane) {
 
     let mut marks = String::new();
     let mut numbers = String::new();
-    for tick in ticks(window.min.x, window.max.x, count(0)) {
+    let across = at_least_two(window.min.x, window.max.x, count(0));
+    let texts = written(&across);
+    // numbers that would run into each other make room for the first and the last
+    let widest = texts.iter().map(|text| text.chars().count()).max().unwrap_or(1);
+    let room = size.x / across.len().max(1) as f64 >= LETTER * widest as f64 + 6.0;
+    for (k, (tick, label)) in across.iter().zip(&texts).enumerate() {
         let x = frame.page(DVec2::new(tick.value(), 0.0)).x;
         let _ = write!(marks, "M{x:.2} {bottom}v{TICK}");
-        let _ = writeln!(numbers, r#"<text x="{x:.2}" y="{:.2}">{tick}</text>"#, bottom + TICK + 13.0);
+        if room || k == 0 || k + 1 == across.len() {
+            let _ = writeln!(numbers, r#"<text x="{x:.2}" y="{:.2}">{label}</text>"#, bottom + TICK + 13.0);
+        }
     }
     let mut widest = 1;
-    for tick in ticks(window.min.y, window.max.y, count(1)) {
+    let upwards = at_least_two(window.min.y, window.max.y, count(1));
+    for (tick, label) in upwards.iter().zip(written(&upwards)) {
         let y = frame.page(DVec2::new(0.0, tick.value())).y;
-        let label = tick.to_string();
         widest = widest.max(label.chars().count());
         let _ = write!(marks, "M{left} {y:.2}h-{TICK}");
         let _ = writeln!(
@@ -87,15 +99,28 @@ pub fn draw(out: &mut String, frame: &PlotFrame, plane: Plane) {
     let (x, y) = (left + 0.5 * size.x, bottom + 38.0);
     let _ = writeln!(
         out,
-        r#"<text x="{x:.2}" y="{y:.2}" font-size="14" text-anchor="middle">{}</text>"#,
+        r#"<text x="{x:.2}" y="{y:.2}" font-size="14" text-anchor="middle">{}, m</text>"#,
         right.name()
     );
-    let (x, y) = (left - TICK - 14.0 - 6.6 * widest as f64, origin.y + 0.5 * size.y + 4.0);
+    let (x, y) = (left - TICK - 14.0 - LETTER * widest as f64, origin.y + 0.5 * size.y + 4.0);
     let _ = writeln!(
         out,
-        r#"<text x="{x:.2}" y="{y:.2}" font-size="14" text-anchor="middle">{}</text>"#,
+        r#"<text transform="translate({x:.2} {y:.2}) rotate(-90)" font-size="14" text-anchor="middle">{}, m</text>"#,
         up.name()
     );
+}
+
+/// Round numbers between two, at least two of them if there are any: one alone says nothing of the scale.
+fn at_least_two(min: f64, max: f64, count: usize) -> Vec<Decimal> {
+    let found = (count..count + 4).map(|count| ticks(min, max, count));
+    let mut first = None;
+    for ticks in found {
+        if ticks.len() >= 2 {
+            return ticks;
+        }
+        first.get_or_insert(ticks);
+    }
+    first.unwrap_or_default()
 }
 
 /// The colour of lines and text, a little softer than black.

@@ -8,6 +8,7 @@
 //! Invariant: this module sees a [`Field`] and nothing of how it was made. It opens no file and queries no
 //! terminal. The same field gives the same bytes on any number of threads.
 
+mod arrows;
 mod axes;
 mod colour;
 mod error;
@@ -38,6 +39,25 @@ pub use self::{
     sheet::{Panel, write_sheet_png, write_sheet_svg},
 };
 use crate::field::Field;
+
+/// What a slice shows.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Quantity {
+    /// ω, which is no length.
+    #[default]
+    Omega,
+    /// The distance from the surface, m: positive inside, as ω is.
+    Distance,
+}
+
+/// How a slice is drawn.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Style {
+    /// What its field is.
+    pub quantity: Quantity,
+    /// Whether arrows show −∇ω, the way out.
+    pub arrows: bool,
+}
 
 /// The number of samples along the longer side that makes a plot smooth at the printed size.
 pub const DEFAULT_SAMPLES: usize = 320;

@@ -74,6 +74,27 @@ impl fmt::Display for Decimal {
     }
 }
 
+/// Numbers that belong together as text: as plain digits if those of all are few, or else like 5e−7.
+pub fn written(numbers: &[Decimal]) -> Vec<String> {
+    let is_plain = |n: &Decimal| n.mantissa == 0 || (-5..=4).contains(&n.exponent);
+    if numbers.iter().all(is_plain) {
+        return numbers.iter().map(Decimal::to_string).collect();
+    }
+    let text = |n: &Decimal| {
+        let sign = if n.mantissa < 0 { "−" } else { "" };
+        let mut digits = n.mantissa.unsigned_abs();
+        let mut exponent = n.exponent;
+        while digits > 0 && digits.is_multiple_of(10) {
+            (digits, exponent) = (digits / 10, exponent + 1);
+        }
+        match digits {
+            0 => "0".to_string(),
+            _ => format!("{sign}{digits}e{}{}", if exponent < 0 { "−" } else { "" }, exponent.unsigned_abs()),
+        }
+    };
+    numbers.iter().map(text).collect()
+}
+
 /// About `count`/2 to `count` round numbers from `min` to `max`, evenly spaced and with the same number
 /// of digits.
 pub fn ticks(min: f64, max: f64, count: usize) -> Vec<Decimal> {
@@ -97,6 +118,18 @@ pub fn ticks(min: f64, max: f64, count: usize) -> Vec<Decimal> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn numbers_that_belong_together_are_written_alike() {
+        let of = |parts: &[(i64, i32)]| {
+            let numbers: Vec<Decimal> =
+                parts.iter().map(|&(mantissa, exponent)| Decimal { mantissa, exponent }).collect();
+            written(&numbers).join(" ")
+        };
+        assert_eq!(of(&[(-1, -5), (-5, -6), (0, 0), (5, -6), (10, -6)]), "−1e−5 −5e−6 0 5e−6 1e−5");
+        assert_eq!(of(&[(-1, -3), (0, 0), (5, -4)]), "−0.001 0 0.0005");
+        assert_eq!(of(&[(20, 4), (1, 5)]), "2e5 1e5");
+    }
 
     #[track_caller]
     fn check_ticks(min: f64, max: f64, expected: &str) {

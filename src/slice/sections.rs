@@ -47,7 +47,7 @@ pub(super) fn drawing(
 ) -> Result<Drawing, SliceError> {
     let frame = PlotFrame::new(window, DVec2::new(LEFT, TOP));
     let mut body = String::new();
-    let _ = writeln!(body, r#"<text x="{LEFT}" y="{}" font-size="16">{plane}</text>"#, TOP - 16.0);
+    let _ = writeln!(body, r#"<text x="{LEFT}" y="{}" font-size="16">{plane} m</text>"#, TOP - 16.0);
     for (k, cut) in cuts.iter().enumerate() {
         let (colour, angle) = (COLOURS[k % COLOURS.len()], ANGLES[k % ANGLES.len()]);
         let _ = writeln!(

@@ -6,7 +6,7 @@ use std::io;
 use glam::DVec2;
 
 use super::{
-    SliceError, Window,
+    SliceError, Style, Window,
     plane::Plane,
     png,
     sample::sample,
@@ -20,6 +20,8 @@ pub struct Panel<'a> {
     pub plane: Plane,
     /// The part of it that is drawn.
     pub window: Window,
+    /// How one solid is drawn.
+    pub style: Style,
     /// The solids that it cuts.
     pub cuts: Vec<Cut<'a>>,
 }
@@ -60,7 +62,7 @@ fn sheet(title: &str, panels: &[Panel<'_>], samples: usize) -> Result<String, Sl
     let draw = |(k, panel): (usize, &Panel<'_>)| match &panel.cuts[..] {
         [one] => {
             let samples = sample(one.field, panel.plane, panel.window, samples)?;
-            Ok(drawing(one.field, &one.name, &samples, &k.to_string()))
+            Ok(drawing(one.field, &one.name, &samples, panel.style, &k.to_string()))
         }
         several => sections::drawing(several, panel.plane, panel.window, samples, &k.to_string()),
     };
@@ -98,7 +100,7 @@ mod tests {
     fn panel<'a>(cuts: &[(&str, &'a dyn Field)], z: f64, half: f64) -> Panel<'a> {
         let cuts = cuts.iter().map(|&(name, field)| Cut { name: name.into(), field }).collect();
         let window = Window::new(DVec2::splat(-half), DVec2::new(half, 0.6 * half));
-        Panel { plane: Plane::new(Axis::Z, z), window, cuts }
+        Panel { plane: Plane::new(Axis::Z, z), window, style: Style::default(), cuts }
     }
 
     #[test]
@@ -134,7 +136,7 @@ mod tests {
             .map(|panel| match &panel.cuts[..] {
                 [one] => {
                     let samples = sample(one.field, panel.plane, panel.window, 60).unwrap();
-                    drawing(one.field, &one.name, &samples, "").size
+                    drawing(one.field, &one.name, &samples, Style::default(), "").size
                 }
                 several => sections::drawing(several, panel.plane, panel.window, 60, "").unwrap().size,
             })
@@ -157,7 +159,7 @@ mod tests {
         let mut bytes = Vec::new();
         let window = Window::new(DVec2::splat(-1.0), DVec2::ONE);
         let cuts = cuts.map(|(name, field)| Cut { name: name.into(), field }).into();
-        let panels = [Panel { plane: Plane::new(Axis::Z, 0.0), window, cuts }];
+        let panels = [Panel { plane: Plane::new(Axis::Z, 0.0), window, style: Style::default(), cuts }];
         write_sheet_png("disc", &panels, 200, 1.0, &mut bytes).unwrap();
         let mut reader = ::png::Decoder::new(std::io::Cursor::new(&bytes)).read_info().unwrap();
         let mut pixels = vec![0; reader.output_buffer_size().unwrap()];

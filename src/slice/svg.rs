@@ -8,10 +8,12 @@ use std::fmt::Write;
 use glam::DVec2;
 
 use super::{
+    Quantity, Style, arrows,
     axes::{self, INK, PlotFrame},
     colour::{Rgb, Scale, UNDEFINED},
     isolines::{Outline, outlines},
     labels::{LevelLabel, Placer},
+    numbers::written,
     paths,
     sample::Samples,
 };
@@ -23,7 +25,7 @@ const BELOW: f64 = 52.0;
 /// The colour bar: the gap before it, its width, and the room for its title.
 const BAR: [f64; 3] = [26.0, 16.0, 22.0];
 /// The room for the numbers of the colour bar: that around them, and for each character.
-const NUMBERS: [f64; 2] = [18.0, 6.8];
+const NUMBERS: [f64; 2] = [20.0, 7.8];
 /// The largest height of a band in the colour bar, and the least for a legible number.
 const BAND: [f64; 2] = [26.0, 15.0];
 
@@ -50,11 +52,11 @@ impl Drawing {
 
 /// The slice as an SVG document. `name` becomes part of the title. The samples must be those of the field.
 pub fn svg(field: &dyn Field, name: &str, samples: &Samples) -> String {
-    drawing(field, name, samples, "").document(&format!("{name}, {}", samples.plane))
+    drawing(field, name, samples, Style::default(), "").document(&format!("{name}, {} m", samples.plane))
 }
 
 /// The slice as a part of a document. `id` keeps the patterns of several apart.
-pub fn drawing(field: &dyn Field, name: &str, samples: &Samples, id: &str) -> Drawing {
+pub fn drawing(field: &dyn Field, name: &str, samples: &Samples, style: Style, id: &str) -> Drawing {
     let frame = PlotFrame::new(samples.window, DVec2::new(LEFT, TOP));
     let scale = Scale::for_samples(samples);
     let bar = Bar::new(&frame, &scale);
@@ -62,7 +64,7 @@ pub fn drawing(field: &dyn Field, name: &str, samples: &Samples, id: &str) -> Dr
     let height = frame.bottom().max(bar.bottom) + BELOW;
 
     let mut out = format!(
-        r##"<text x="{LEFT}" y="{2}" font-size="16">{0}<tspan fill="#555" dx="9">{1}</tspan></text>
+        r##"<text x="{LEFT}" y="{2}" font-size="16">{0}<tspan fill="#555" dx="9">{1} m</tspan></text>
 "##,
         escaped(name),
         samples.plane,
@@ -70,8 +72,11 @@ pub fn drawing(field: &dyn Field, name: &str, samples: &Samples, id: &str) -> Dr
     );
     bands_and_lines(&mut out, field, samples, &frame, &scale);
     undefined_cells(&mut out, samples, &frame, id);
+    if style.arrows {
+        arrows::draw(&mut out, field, samples.plane, &frame);
+    }
     axes::draw(&mut out, &frame, samples.plane);
-    bar.draw(&mut out, &scale);
+    bar.draw(&mut out, &scale, style.quantity);
     Drawing { size: DVec2::new(width, height), body: out }
 }
 
@@ -134,8 +139,8 @@ fn labels(
         lines.iter().map(|level| level.iter().map(|(points, _)| points.clone()).collect()).collect();
     let mut placer = Placer::new(frame, &lines);
     let mut text = String::new();
-    for (k, level) in scale.decimals().iter().enumerate().filter(|(k, _)| *k != zero) {
-        let Some(LevelLabel { at, angle, text: label }) = placer.place(k, &level.to_string()) else {
+    for (k, level) in written(scale.decimals()).iter().enumerate().filter(|(k, _)| *k != zero) {
+        let Some(LevelLabel { at, angle, text: label }) = placer.place(k, level) else {
             continue;
         };
         // the halo has the colour of the ground, so the line seems to be interrupted
@@ -200,8 +205,7 @@ impl Bar {
         let band = (frame.size.y / bands).clamp(BAND[1], BAND[0]).floor();
         // centred beside the plot, or from the plot's upper edge down if the plot is lower than the bar
         let top = frame.origin.y + (0.5 * (frame.size.y - bands * band)).max(0.0).round();
-        let widest =
-            scale.decimals().iter().map(|level| level.to_string().chars().count()).max().unwrap_or(1);
+        let widest = written(scale.decimals()).iter().map(|level| level.chars().count()).max().unwrap_or(1);
         let numbers = NUMBERS[0] + NUMBERS[1] * widest as f64;
         Self { left: frame.right() + BAR[0], band, bottom: top + bands * band, numbers }
     }
@@ -211,7 +215,7 @@ impl Bar {
         self.bottom - self.band * band as f64
     }
 
-    fn draw(&self, out: &mut String, scale: &Scale) {
+    fn draw(&self, out: &mut String, scale: &Scale, quantity: Quantity) {
         let (left, width, band) = (self.left, BAR[1], self.band);
         let (right, middle, bands) = (left + width, left + 0.5 * width, scale.bands());
         for k in 0..bands {
@@ -231,7 +235,7 @@ impl Bar {
 <g font-size="12">"#
         );
         let mut zero = 0.0;
-        for (k, level) in scale.decimals().iter().enumerate() {
+        for (k, (level, text)) in scale.decimals().iter().zip(written(scale.decimals())).enumerate() {
             let y = self.border(k + 1);
             let weight = if level.mantissa == 0 { 1.8 } else { 0.8 };
             if level.mantissa == 0 {
@@ -239,16 +243,18 @@ impl Bar {
             }
             let _ = writeln!(
                 out,
-                r#"<path d="M{left} {y}h{}" stroke="{INK}" stroke-width="{weight}"/><text x="{}" y="{}">{level}</text>"#,
+                r#"<path d="M{left} {y}h{}" stroke="{INK}" stroke-width="{weight}"/><text x="{}" y="{}">{text}</text>"#,
                 width + 4.0,
                 right + 8.0,
                 y + 4.0
             );
         }
         let x = right + self.numbers + 4.0;
-        for (y, text) in
-            [(0.5 * (zero + tip), "inside, ω &gt; 0"), (0.5 * (zero + tail), "outside, ω &lt; 0")]
-        {
+        let [inside, outside] = match quantity {
+            Quantity::Omega => ["inside, ω &gt; 0", "outside, ω &lt; 0"],
+            Quantity::Distance => ["depth inside, m", "−distance, m"],
+        };
+        for (y, text) in [(0.5 * (zero + tip), inside), (0.5 * (zero + tail), outside)] {
             let _ = writeln!(
                 out,
                 r#"<text transform="translate({x} {y:.2}) rotate(-90)" text-anchor="middle">{text}</text>"#
@@ -308,7 +314,7 @@ mod tests {
         let text = plot(&pawn(), "pawn");
         assert!(png::parse(&text).is_ok());
         assert!(text.len() < 60_000, "{} bytes", text.len());
-        for expected in ["<title>pawn, y = 1.5</title>", ">−0.5</text>", ">1.2</text>", "inside, ω &gt; 0"]
+        for expected in ["<title>pawn, y = 1.5 m</title>", ">−0.5</text>", ">1.2</text>", "inside, ω &gt; 0"]
         {
             assert!(text.contains(expected), "no {expected}");
         }
@@ -345,7 +351,7 @@ mod tests {
         let mut reader = ::png::Decoder::new(std::io::Cursor::new(&bytes)).read_info().unwrap();
         let mut pixels = vec![0; reader.output_buffer_size().unwrap()];
         let info = reader.next_frame(&mut pixels).unwrap();
-        assert_eq!((info.width, info.height), (288, 278));
+        assert_eq!((info.width, info.height), (291, 278));
         assert_eq!(pixels[..3], [255, 255, 255]);
         let mut nothing = Vec::new();
         assert!(

@@ -36,6 +36,14 @@ const LOOK: u64 = 8;
 /// Greatest excess of energy, as a part of the reference, that is no finding.
 const MOST_EXCESS: f64 = 0.01;
 
+/// Greatest excess of energy that is no finding, as a part of the greatest energy of motion: of a low wave in deep
+/// water nearly all energy is that of the depth, which cannot move.
+const MOST_OF_MOTION: f64 = 0.25;
+
+/// The least excess, as a part of the reference, that is a finding by this measure: water that comes to rest moves
+/// next to nothing.
+const LEAST_EXCESS: f64 = 0.002;
+
 /// An excess of energy, as a part of the reference, that ends a run.
 const RUINOUS_EXCESS: f64 = 1.0;
 
@@ -83,6 +91,8 @@ pub struct Audit {
     /// Sum of the places at the last step, m.
     places: DVec3,
     excess: f64,
+    /// The greatest energy of motion so far, J.
+    liveliest: f64,
     /// Mean of ρ₀/max(ρ, ρ₀) at the start.
     volume_at_start: f64,
     /// The change of the volume that is largest by its amount.
@@ -279,6 +289,7 @@ impl Audit {
             power: mass * sums.power,
             places: sums.places,
             excess: 0.0,
+            liveliest: 0.5 * mass * sums.squares,
             volume_at_start: volume,
             volume_change: 0.0,
             compression,
@@ -313,6 +324,7 @@ impl Audit {
             self.unjudged = Some(UNDEFINED_WORK);
         }
         (self.places, self.power) = (sums.places, power);
+        self.liveliest = self.liveliest.max(0.5 * mass * sums.squares);
         (self.now.speed, self.max_speed) = (sums.fastest, self.max_speed.max(sums.fastest));
         if self.unjudged.is_none() {
             let energy = mass * (0.5 * sums.squares + sums.elastic);
@@ -406,13 +418,30 @@ impl Audit {
     /// that the method is to keep, if it promises any.
     pub fn findings(&self, kept: Option<f64>) -> Vec<(Finding, String)> {
         let percent = |x: f64| 100.0 * x;
-        let energy = self.energy_excess().filter(|excess| *excess > MOST_EXCESS).map(|excess| {
-            let percent = percent(excess);
-            match self.is_moved {
-                true => format!(
-                    "the energy rose by {percent:.1} % of the greatest so far, with no work to explain it"
-                ),
-                false => format!("the energy was {percent:.1} % above that at the start and gravity's work"),
+        let energy = self.energy_excess().and_then(|excess| {
+            let gained = excess * self.reference;
+            let is_more = gained > MOST_OF_MOTION * self.liveliest;
+            let outgrows_motion = !self.is_moved && excess > LEAST_EXCESS && is_more;
+            let of_all = percent(excess);
+            match (excess > MOST_EXCESS, self.is_moved) {
+                (true, true) => Some(format!(
+                    "the energy rose by {of_all:.1} % of the greatest so far, with no work to explain it"
+                )),
+                (true, false) => {
+                    Some(format!("the energy was {of_all:.1} % above that at the start and gravity's work"))
+                }
+                (false, _) if outgrows_motion => {
+                    let part = if gained > self.liveliest {
+                        "more than the".to_string()
+                    } else {
+                        format!("{:.0} % of the", percent(gained / self.liveliest))
+                    };
+                    Some(format!(
+                        "the energy was {of_all:.1} % above that at the start and gravity's work, which is {part} \
+                         greatest energy of motion: waves may have grown by it"
+                    ))
+                }
+                (false, _) => None,
             }
         });
         let change = self.volume_change;
@@ -470,6 +499,7 @@ impl Audit {
             p99,
             largest,
             self.max_speed,
+            self.liveliest,
         ];
         let now = self.now;
         let Compression { mean, p99, largest } = now.compression;
@@ -477,8 +507,13 @@ impl Audit {
         numbers.into_iter().chain(now).chain(told).collect()
     }
 
-    /// Takes up the audit of a checkpoint. A memory of another length is ignored.
+    /// Takes up the audit of a checkpoint. A memory of another length is ignored, but for those of versions that did
+    /// not have the greatest energy of motion.
     pub(super) fn take_up(&mut self, memory: &[f64]) {
+        let mut memory = memory.to_vec();
+        if memory.len() == 27 {
+            memory.insert(18, self.liveliest);
+        }
         let Ok(
             [
                 reference,
@@ -499,6 +534,7 @@ impl Audit {
                 p99,
                 largest,
                 max_speed,
+                liveliest,
                 excess_now,
                 volume_now,
                 mean_now,
@@ -507,7 +543,7 @@ impl Audit {
                 speed,
                 told @ ..,
             ],
-        ) = <[f64; 27]>::try_from(memory)
+        ) = <[f64; 28]>::try_from(memory)
         else {
             return;
         };
@@ -524,6 +560,7 @@ impl Audit {
             power,
             places: DVec3::new(x, y, z),
             excess,
+            liveliest,
             volume_at_start,
             volume_change,
             compression: Compression { mean, p99, largest },

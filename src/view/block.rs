@@ -43,11 +43,33 @@ pub struct FrameHead {
     pub ranges: Vec<Levels>,
     /// The number of the obstacles' mesh at this time, in the order in which meshes are given.
     pub mesh: Option<usize>,
+    /// Where each of its parts is, as the columns of its rotation and its translation, m; empty if the mesh lies right.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub poses: Vec<[f64; 12]>,
+    /// The number of the fluid's surface at this time, in the order in which surfaces are given.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub surface: Option<usize>,
     /// The number of the run that the frame belongs to; a page that is told of a new run forgets frames of older ones.
     pub run: u64,
     /// How numbers follow from velocities; `None` if they are stated without.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub motion: Option<Motion>,
+}
+
+impl FrameHead {
+    /// The head of a frame of no particles at a time, s, without meshes.
+    pub fn at(time: f64) -> Self {
+        Self {
+            time,
+            step: None,
+            ranges: Vec::new(),
+            mesh: None,
+            poses: Vec::new(),
+            surface: None,
+            run: 0,
+            motion: None,
+        }
+    }
 }
 
 /// How the numbers of a frame follow from velocities, so that only what is left of them must be stated.
@@ -156,10 +178,23 @@ pub fn pack_frame(head: &FrameHead, frame: &Frame, before: Option<&Frame>) -> Ve
     out
 }
 
+/// What a mesh is that of.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum MeshRole {
+    /// Obstacles, or a solid alone.
+    Solids,
+    /// Obstacles that are where frames say, besides others of one instant alone.
+    Carried,
+    /// The surface of a fluid.
+    Fluid,
+}
+
 /// What the head of a mesh says.
 #[derive(Serialize)]
 struct MeshHead {
     triangles: usize,
+    /// The numbers of triangles of its parts, which are one after the other.
+    parts: Vec<usize>,
     min: [f64; 3],
     max: [f64; 3],
     time: f64,
@@ -169,12 +204,24 @@ struct MeshHead {
 /// The block of a mesh: positions and normals with 16 bits for each coordinate, then the corners of triangles. `time` is
 /// the instant at which what moves stands so, s, and `run` the number of the run that the mesh belongs to.
 pub fn pack_mesh(mesh: &Mesh, time: f64, run: u64) -> Vec<u8> {
+    pack_parts(std::slice::from_ref(mesh), MeshRole::Solids, time, run)
+}
+
+/// The block of a mesh of several parts, as [`pack_mesh`]. A frame may say where each of them is.
+pub fn pack_parts(parts: &[Mesh], role: MeshRole, time: f64, run: u64) -> Vec<u8> {
+    let mesh = Mesh::joined(parts);
     let bounds = mesh.positions.iter().fold(Aabb::EMPTY, |all, p| all.including(*p));
     let bounds = if mesh.positions.is_empty() { Aabb::new(DVec3::ZERO, DVec3::ONE) } else { bounds };
     let lattice = Lattice::new(&bounds);
     let (min, max) = (lattice.bounds().min.to_array(), lattice.bounds().max.to_array());
-    let rest = MeshHead { triangles: mesh.triangles.len(), min, max, time, run };
-    let head = Head { kind: "mesh", count: mesh.positions.len(), follows: false, rest: &rest };
+    let parts = parts.iter().map(|part| part.triangles.len()).collect();
+    let rest = MeshHead { triangles: mesh.triangles.len(), parts, min, max, time, run };
+    let kind = match role {
+        MeshRole::Solids => "mesh",
+        MeshRole::Carried => "carried",
+        MeshRole::Fluid => "surface",
+    };
+    let head = Head { kind, count: mesh.positions.len(), follows: false, rest: &rest };
     let mut out = begin(&head);
     let unit = Lattice::new(&Aabb::new(DVec3::NEG_ONE, DVec3::ONE));
     for (lattice, vectors) in [(lattice, &mesh.positions), (unit, &mesh.normals)] {

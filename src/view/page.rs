@@ -37,8 +37,24 @@ const PROGRAM: &[&str] = &[
 /// A self-contained document that is being written.
 pub struct Page<'a> {
     out: &'a mut dyn Write,
-    /// Blocks that are not written yet, each behind its length.
+    meshes: Group,
+    frames: Group,
+}
+
+/// Blocks that are not written yet, each behind its length, and the bytes of those that are.
+#[derive(Default)]
+struct Group {
     waiting: Vec<u8>,
+    written: u64,
+}
+
+/// What the parts of a document take, bytes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Sizes {
+    /// Its frames.
+    pub frames: u64,
+    /// Its meshes.
+    pub meshes: u64,
 }
 
 /// Blocks that are written together have about this many bytes: browsers take milliseconds for each group, and runs may have
@@ -58,42 +74,84 @@ impl<'a> Page<'a> {
         let json = serde_json::to_string(setting)?.replace('<', "\\u003c");
         out.write_all(json.as_bytes())?;
         out.write_all(b"</script>\n")?;
-        Ok(Self { out, waiting: Vec::new() })
+        Ok(Self { out, meshes: Group::default(), frames: Group::default() })
     }
 
-    /// Adds a block, deflated and as base64, together with those around it if it is small.
+    /// Adds the block of a frame, deflated and as base64, together with those around it if it is small.
     ///
     /// # Errors
     /// Those of the stream, and blocks of 4 GiB and more.
-    pub fn block(&mut self, block: &[u8]) -> io::Result<()> {
-        let length = u32::try_from(block.len()).map_err(io::Error::other)?;
-        self.waiting.extend(length.to_le_bytes());
-        self.waiting.extend(block);
-        if self.waiting.len() >= GROUP { self.group() } else { Ok(()) }
-    }
-
-    /// Writes the blocks that wait.
-    fn group(&mut self) -> io::Result<()> {
-        if self.waiting.is_empty() {
+    pub fn frame(&mut self, block: &[u8]) -> io::Result<()> {
+        self.frames.add(block)?;
+        if self.frames.waiting.len() < GROUP {
             return Ok(());
         }
-        self.out.write_all(b"<script type=\"application/octet-stream\">")?;
-        let base64 = EncoderWriter::new(&mut *self.out, &BASE64_STANDARD);
-        let mut deflated = DeflateEncoder::new(base64, Compression::new(7));
-        deflated.write_all(&self.waiting)?;
-        self.waiting.clear();
-        deflated.finish()?.finish()?;
-        self.out.write_all(b"</script>\n")
+        // a frame needs the meshes that it names
+        self.meshes.write(self.out)?;
+        self.frames.write(self.out)
+    }
+
+    /// Adds the block of a mesh that frames name from now on, as [`Page::frame`].
+    ///
+    /// # Errors
+    /// Those of the stream, and blocks of 4 GiB and more.
+    pub fn mesh(&mut self, block: &[u8]) -> io::Result<()> {
+        self.meshes.add(block)?;
+        if self.meshes.waiting.len() >= GROUP { self.meshes.write(self.out) } else { Ok(()) }
     }
 
     /// Ends the document.
     ///
     /// # Errors
     /// Those of the stream.
-    pub fn end(mut self) -> io::Result<()> {
-        self.group()?;
+    pub fn end(mut self) -> io::Result<Sizes> {
+        self.meshes.write(self.out)?;
+        self.frames.write(self.out)?;
         let (_, tail) = parts();
-        self.out.write_all(tail.replace("/*PROGRAM*/", &PROGRAM.concat()).as_bytes())
+        self.out.write_all(tail.replace("/*PROGRAM*/", &PROGRAM.concat()).as_bytes())?;
+        Ok(Sizes { frames: self.frames.written, meshes: self.meshes.written })
+    }
+}
+
+impl Group {
+    fn add(&mut self, block: &[u8]) -> io::Result<()> {
+        let length = u32::try_from(block.len()).map_err(io::Error::other)?;
+        self.waiting.extend(length.to_le_bytes());
+        self.waiting.extend(block);
+        Ok(())
+    }
+
+    /// Writes the blocks that wait.
+    fn write(&mut self, out: &mut dyn Write) -> io::Result<()> {
+        if self.waiting.is_empty() {
+            return Ok(());
+        }
+        out.write_all(b"<script type=\"application/octet-stream\">")?;
+        let counting = Counting { out: &mut *out, count: 0 };
+        let base64 = EncoderWriter::new(counting, &BASE64_STANDARD);
+        let mut deflated = DeflateEncoder::new(base64, Compression::new(7));
+        deflated.write_all(&self.waiting)?;
+        self.waiting.clear();
+        self.written += deflated.finish()?.finish()?.count;
+        out.write_all(b"</script>\n")
+    }
+}
+
+/// A stream that counts its bytes.
+struct Counting<'a> {
+    out: &'a mut dyn Write,
+    count: u64,
+}
+
+impl Write for Counting<'_> {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        let written = self.out.write(bytes)?;
+        self.count += written as u64;
+        Ok(written)
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        self.out.flush()
     }
 }
 
@@ -125,17 +183,19 @@ pub fn solid(title: &str, mesh: &Mesh, out: &mut dyn Write) -> io::Result<()> {
         ),
         live: false,
         moves: false,
+        has_surface: false,
         domain: Corners::from(&bounds),
         lattice: None,
         radius: 0.0,
         arrays: Vec::new(),
+        solids: Vec::new(),
         gravity: None,
         params: Vec::new(),
         plots: None,
     };
     let mut page = Page::begin(out, &setting)?;
-    page.block(&pack_mesh(&split_creases(mesh), 0.0, 0))?;
-    page.end()
+    page.mesh(&pack_mesh(&split_creases(mesh), 0.0, 0))?;
+    page.end().map(|_| ())
 }
 
 /// What stands before the data, and what stands behind it.

@@ -16,6 +16,8 @@ pub struct Setting {
     pub live: bool,
     /// Whether a solid moves where no fluid does.
     pub moves: bool,
+    /// Whether frames have surfaces of the fluid.
+    pub has_surface: bool,
     /// The box whose edges are drawn.
     #[serde(rename = "box")]
     pub domain: Corners,
@@ -25,6 +27,8 @@ pub struct Setting {
     pub radius: f64,
     /// The arrays of every frame, in their order. A page without arrays shows no particles.
     pub arrays: Vec<Array>,
+    /// The solids that a live page may show, the one that is shown first; none where they stand in a fluid's way.
+    pub solids: Vec<String>,
     /// Gravity, m/s², if it is constant.
     pub gravity: Option<[f64; 3]>,
     /// The params that a live page may change.

@@ -273,16 +273,39 @@ fn slices_are_pictures() {
         std::fs::read_to_string(folder.path().join("sheet.svg")).unwrap()
     };
     let planes = sheet(&[pawn, "--slice", "y=1.5,z=0.5,x=1.5"]);
-    assert_eq!(["y = 1.5<", "z = 0.5<", "x = 1.5<"].map(|plane| planes.matches(plane).count()), [1; 3]);
+    assert_eq!(["y = 1.5 m<", "z = 0.5 m<", "x = 1.5 m<"].map(|plane| planes.matches(plane).count()), [1; 3]);
     let paddle = root().join("examples/paddle.rfm");
     let paddle = paddle.to_str().unwrap();
     let solids = sheet(&[paddle, "-s", "paddle,stirrer", "--slice", "z=0.2,y=0.05"]);
-    for (text, count) in [(">paddle<", 2), (">stirrer<", 2), ("z = 0.2<", 1), ("fill=\"url(#hatch1-1)\"", 2)]
+    for (text, count) in
+        [(">paddle<", 2), (">stirrer<", 2), ("z = 0.2 m<", 1), ("fill=\"url(#hatch1-1)\"", 2)]
     {
         assert_eq!(solids.matches(text).count(), count, "{text}");
     }
+    // distances are lengths: their levels are those of a ball, and arrows show the way out
+    let ball = folder.path().join("ball.rfm");
+    std::fs::write(&ball, "rfm 1\nsolid ball = sphere(0.5) and sphere(2)\n").unwrap();
+    let ball = ball.to_str().unwrap();
+    let distance =
+        sheet(&[ball, "--slice", "z=0", "--plot", "distance", "--arrows", "--window", "-1,-1,1,1"]);
+    assert!(
+        distance.contains(">depth inside, m<")
+            && distance.contains(">x, m<")
+            && distance.contains(">z = 0 m<")
+    );
+    let numbers: Vec<f64> = distance
+        .split("</text>")
+        .filter_map(|part| part.rsplit_once('>')?.1.replace('−', "-").parse().ok())
+        .collect();
+    // half a metre to the middle, and √2 − ½ to the corners
+    assert!(numbers.iter().all(|n| n.abs() <= 1.0), "{numbers:?}");
+    assert!(numbers.contains(&0.4) && numbers.contains(&-0.6), "{numbers:?}");
+    let heads = distance.matches('z').count();
+    assert!(heads > 150, "{heads} arrow heads");
     for words in [
-        &["check", pawn, "--slice", "y=1.5,z=1", "--term"][..],
+        &["check", paddle, "--slice", "z=0.2", "-s", "paddle,stirrer", "--plot", "distance"][..],
+        &["check", pawn, "--slice", "y=1.5", "--arrows", "--term"],
+        &["check", pawn, "--slice", "y=1.5,z=1", "--term"],
         &["check", pawn, "--slice", "y=1.5,z=1", "--window", "0,0,1,1"],
         &["check", paddle, "--slice", "z=0.2", "-s", "paddle,paddel"],
     ] {

@@ -175,6 +175,16 @@ fn the_surface_of_the_fluid_has_the_colours_of_particles_and_is_cut() {
         let [blue, red, ..] = shares(&picture(&[&[kind][..], &red].concat()));
         assert!(blue < 0.001 && (red > 0.01 || kind == "--surface"), "{kind}: {blue} {red}");
     }
+    // particles stay in front of a section unless they are cut, too, and none stands out of the plane then
+    let shown =
+        |flags: &[&str]| shares(&picture(&[&["--by", "speed", "--range", "-9..-8"], flags].concat()))[1];
+    let (whole, cut) = (shown(&["--cut", "y=0.5"]), shown(&["--cut", "y=0.5", "--cut-fluid"]));
+    assert!(cut > 0.2 * whole && cut < 0.95 * whole, "{cut} {whole}");
+    assert!(shown(&["--cut", "y=2", "--cut-fluid"]) == 0.0);
+    for flags in [&["--cut-fluid"][..], &["--cut", "auto", "--cut-fluid"]] {
+        let words = [&["render", "drop.out", "-o", "x.png", "--frames", "5"], flags].concat();
+        rfm(here, &words).expect(2);
+    }
     // a run draws its own
     let run = |out: &str, flags: &[&str]| {
         let first = ["run", "drop.rfm", "-o", out, "--steps", "1"];

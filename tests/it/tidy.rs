@@ -65,7 +65,7 @@ const MAY_USE: &[(&str, &[&str])] = &[
         ],
     ),
     ("slice", &["field", "geom", "interval", "lettering"]),
-    ("mesh", &["field", "geom", "interval"]),
+    ("mesh", &["field", "geom", "interval", "table", "triangles"]),
     ("fluid_surface", &["geom", "mesh"]),
     ("sph", &["field", "geom", "interval", "precision", "quantity"]),
     ("experiment", &["compile", "diagnostic", "field", "geom", "ir", "lower", "solid", "sph", "precision"]),

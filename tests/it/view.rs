@@ -154,6 +154,63 @@ fn a_saved_page_holds_every_position_in_few_bytes() {
 }
 
 #[test]
+fn what_is_only_moved_has_one_mesh_and_surfaces_of_the_fluid_are_shown() {
+    let folder = tempfile::tempdir().unwrap();
+    let here = folder.path();
+    let text = SCENE
+        .replace("post = cylinder(r, 0.5)", "post = box([0, -0.05, 0.1], [r, 0.05, 0.5]).rotate_z(4*t)")
+        .replace(
+            "scene drop {",
+            "solid wall = box([0.9, 0, 0], [1, 1, 0.4])\nscene drop {\n  obstacle { solid: wall }",
+        );
+    std::fs::write(here.join("drop.rfm"), text).unwrap();
+    rfm(here, &["run", "drop.rfm", "--no-pictures", "--mesh-cells", "24"]).expect(0);
+    let saved = |name: &str| {
+        let page = rfm(here, &["view", "drop.out", "--save", name]).expect(0);
+        assert!(page.stdout.contains(" bytes per particle and frame, "), "{}", page.stdout);
+        blocks(&std::fs::read_to_string(here.join(name)).unwrap())
+    };
+    let of = |blocks: &[(serde_json::Value, Vec<u8>)], kind: &str| -> Vec<serde_json::Value> {
+        blocks.iter().map(|(head, _)| head).filter(|head| head["kind"] == kind).cloned().collect()
+    };
+    let plain = saved("plain.html");
+    let (meshes, frames) = (of(&plain, "mesh"), of(&plain, "frame"));
+    assert_eq!((meshes.len(), frames.len()), (1, 11));
+    let parts: Vec<_> = meshes[0]["parts"].as_array().unwrap().iter().map(|n| n.as_u64().unwrap()).collect();
+    assert!(parts.len() == 2 && parts.iter().sum::<u64>() == meshes[0]["triangles"].as_u64().unwrap());
+    assert!(frames[0]["poses"].is_null() && frames[0]["surface"].is_null());
+    for (k, frame) in frames.iter().enumerate().skip(1) {
+        let number = |part: usize, i: usize| frame["poses"][part][i].as_f64().unwrap();
+        // the scene names the wall first; the post turns about the axis at (½, ½)
+        let identity = (0..12).map(|i| number(0, i) - f64::from(u8::from(i % 4 == 0 && i < 9)));
+        assert!(identity.map(f64::abs).fold(0.0, f64::max) < 1e-9);
+        let (sin, cos) = (4.0 * 0.02 * k as f64).sin_cos();
+        let moved = [0.5 - 0.5 * cos + 0.5 * sin, 0.5 - 0.5 * sin - 0.5 * cos];
+        for (i, truth) in [(0, cos), (1, sin), (9, moved[0]), (10, moved[1]), (11, 0.0)] {
+            assert!((number(1, i) - truth).abs() < 1e-9, "frame {k}, {i}: {} {truth}", number(1, i));
+        }
+    }
+    rfm(here, &["mesh", "drop.out", "--fluid", "--frames", "3..6"]).expect(0);
+    let with = saved("with.html");
+    let surfaces: Vec<_> = of(&with, "frame").iter().map(|frame| frame["surface"].as_u64()).collect();
+    let none = [None; 3];
+    assert_eq!(surfaces, [&none[..], &[Some(0), Some(1), Some(2)], &[None; 5]].concat());
+    assert_eq!(of(&with, "surface").len(), 3);
+    // those of another run are not shown, and it is said
+    let more =
+        std::fs::read_to_string(here.join("drop.rfm")).unwrap().replace("particles: 800", "particles: 900");
+    std::fs::write(here.join("other.rfm"), more).unwrap();
+    rfm(here, &["run", "other.rfm", "--no-pictures", "-o", "other.out"]).expect(0);
+    std::fs::create_dir(here.join("other.out/surface")).unwrap();
+    for entry in std::fs::read_dir(here.join("drop.out/surface")).unwrap() {
+        let entry = entry.unwrap();
+        std::fs::copy(entry.path(), here.join("other.out/surface").join(entry.file_name())).unwrap();
+    }
+    let other = rfm(here, &["view", "other.out", "--save", "other.html"]).expect(0);
+    assert!(other.stderr.contains("3 surfaces") && other.stderr.contains("another run"), "{}", other.stderr);
+}
+
+#[test]
 fn a_page_of_a_mesh_is_one_file() {
     let folder = tempfile::tempdir().unwrap();
     scene(folder.path());

@@ -100,6 +100,21 @@ impl EvenAxis {
         Self { low: (low / tick).floor() * tick, high: ((low + size) / tick).ceil() * tick, tick, from, to }
     }
 
+    /// Brings the zeros of two axes to one height: each gets as many ticks below and above it as the other has.
+    /// Nothing is done where one of them does not hold zero, or would have more than twice as many ticks.
+    pub fn with_common_zero(axes: &mut [Self]) {
+        let counts = |axis: &Self| [-axis.low, axis.high].map(|end| (end / axis.tick).round());
+        let [first, second] = axes else { return };
+        let ([a, b], [c, d]) = (counts(first), counts(second));
+        let (below, above) = (a.max(c), b.max(d));
+        let holds_zero = [a, b, c, d].iter().all(|count| *count >= 0.0);
+        if holds_zero && below + above <= 2.0 * (a + b).min(c + d) {
+            for axis in [first, second] {
+                (axis.low, axis.high) = (-below * axis.tick, above * axis.tick);
+            }
+        }
+    }
+
     pub fn at(&self, value: f64) -> f64 {
         self.from + (value - self.low) / (self.high - self.low) * (self.to - self.from)
     }
@@ -210,6 +225,25 @@ mod tests {
         assert_eq!(texts(3e-17, 2e-5).len(), 6);
         assert_eq!(texts(3e-17, 2e-5)[0], "1e-16");
         assert_eq!(LogAxis::over(std::iter::empty(), 0.0, 1.0).ticks().len(), 4);
+    }
+
+    #[test]
+    fn zeros_of_two_axes_are_at_one_height_where_there_is_room() {
+        let axes = |ranges: [[f64; 2]; 2]| {
+            let mut axes = ranges.map(|range| EvenAxis::over(range.into_iter(), 100.0, 0.0));
+            EvenAxis::with_common_zero(&mut axes);
+            for (axis, [low, high]) in axes.iter().zip(ranges) {
+                assert!(axis.at(high) >= -1e-9 && axis.at(low) <= 100.0 + 1e-9);
+            }
+            axes
+        };
+        for ranges in [[[-0.3, 0.7], [0.0, 10.0]], [[-5.0, 1.0], [-3e-3, 2e-3]], [[0.0, 1.0], [0.0, 7e4]]] {
+            let [a, b] = axes(ranges);
+            assert!((a.at(0.0) - b.at(0.0)).abs() < 1e-9, "{ranges:?}");
+        }
+        // one that is far from zero keeps its own range
+        let [_, far] = axes([[-1.0, 1.0], [100.0, 101.0]]);
+        assert!(far.at(100.0) - far.at(101.0) > 50.0);
     }
 
     #[test]

@@ -103,20 +103,7 @@ pub(super) fn bodies_of(path: &Path, count: usize) -> Result<Vec<Mesh>, Failure>
             "it has no array `body`, which tells the obstacles apart; `rfm run` writes it".into(),
         ));
     };
-    let mut bodies = vec![Mesh::default(); count];
-    // the number of each vertex within its body
-    let mut numbers = Vec::with_capacity(whole.positions.len());
-    for (k, &body) in array.values.iter().enumerate() {
-        let Some(own) = bodies.get_mut(body as usize).filter(|_| body >= 0.0) else {
-            return Err(failed(format!("its array `body` names the obstacle {body}, and there are {count}")));
-        };
-        numbers.push(own.positions.len() as u32);
-        own.positions.push(whole.positions[k]);
-        own.normals.push(whole.normals[k]);
-    }
-    for triangle in &whole.triangles {
-        let body = array.values[triangle[0] as usize] as usize;
-        bodies[body].triangles.push(triangle.map(|vertex| numbers[vertex as usize]));
-    }
-    Ok(bodies)
+    whole.divided(&array.values, count).ok_or_else(|| {
+        failed(format!("its array `body` tells apart other obstacles than the {count} that there are"))
+    })
 }

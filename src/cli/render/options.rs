@@ -39,6 +39,7 @@ impl Surface {
                         Closer, from the left:       rfm render out -o near.mp4 --camera=-1,-0.3,0.2 --look-at 1.5,1.5,0.5 --zoom 3\n\
                         By pressure, fixed range:    rfm render out -o p.gif --by pressure --range 0..5000\n\
                         The surface of the water:    rfm mesh out --fluid, then rfm render out -o water.gif --surface=opaque\n\
+                        What stands in the water:    rfm render out -o in.png --frames 40 --cut y=1.5 --cut-fluid\n\
                         Through a clear vessel:      rfm render out -o bowl.png --frames 40 --glass bowl\n\
                         A solid:                     rfm render examples/pawn.rfm -o pawn.png\n\
                         A solid that moves:          rfm render examples/paddle.rfm -o paddle.gif --times 0..2\n\n\
@@ -71,6 +72,9 @@ pub(in crate::cli) struct Render {
     /// obstacles that hide much of the fluid of the first frame, `none` none [default: auto; of a solid none]
     #[arg(long, value_name = "AXIS=VALUE|auto|none", value_parser = cut)]
     pub cut: Option<CutFlag>,
+    /// Leave out the particles on that side, too: what stands in the fluid is seen
+    #[arg(long, help_heading = "Runs", requires = "cut")]
+    pub cut_fluid: bool,
     /// The text over the picture [default: the run, its scene and what was cut]
     #[arg(long, value_name = "TEXT")]
     pub title: Option<String>,
@@ -139,6 +143,7 @@ impl Render {
         let given = [
             ("--hide", !self.hide.is_empty()),
             ("--glass", !self.glass.is_empty()),
+            ("--cut-fluid", self.cut_fluid),
             ("--surface", self.surface.is_some()),
             ("--by", self.by.is_some()),
             ("--range", self.range.is_some()),

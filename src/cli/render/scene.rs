@@ -70,6 +70,8 @@ struct RunScene {
     /// Whether the surface has the colours of particles, and the plane that cuts it open.
     tinted: bool,
     cut: Option<Cut>,
+    /// Whether the plane leaves particles out, too.
+    cuts_balls: bool,
     balls: bool,
     /// The scene without particles, and without obstacles that move.
     still: Backdrop,
@@ -115,6 +117,11 @@ impl RunScene {
             Some(CutFlag::Plane(plane)) => Some(half_towards_eye(plane, &camera)),
             Some(CutFlag::Auto | CutFlag::None) | None => None,
         };
+        if options.cut_fluid && cut.is_none() {
+            return Err(Failure::usage(
+                "--cut-fluid leaves out particles at a plane: --cut y=0.5 --cut-fluid",
+            ));
+        }
         let stands = meshes.len() <= 1 && mesh_of.iter().all(|mesh| *mesh == mesh_of[0]);
         let bodies = match meshes.first() {
             Some(file) if stands => bodies_of(file, drawn.len())?,
@@ -141,6 +148,7 @@ impl RunScene {
             surface: options.surface,
             tinted,
             cut,
+            cuts_balls: options.cut_fluid,
             balls,
             still: still.coloured(&scale),
             spent: AtomicU64::new(0),
@@ -152,7 +160,7 @@ impl RunScene {
     /// The picture of a chosen frame.
     fn picture(&self, k: usize) -> Result<Image, Failure> {
         let (_, entry) = &self.entries[k];
-        let (points, values) = self.particles(entry)?;
+        let (mut points, mut values) = self.particles(entry)?;
         let bodies = match self.mesh_of[k].and_then(|mesh| self.meshes.get(mesh)) {
             Some(file) => bodies_of(file, self.drawn.len())?,
             None => Vec::new(),
@@ -163,6 +171,12 @@ impl RunScene {
             Some(water) if self.tinted => values_at(&water.positions, &points, &values, 4.0 * self.radius),
             Some(_) | None => Vec::new(),
         };
+        if let Some(cut) = self.cut.filter(|_| self.cuts_balls) {
+            // no ball stands out of the plane
+            let kept = |p: &DVec3| cut.beyond(*p) <= -self.radius;
+            let seen = points.iter().zip(&values).filter(|(p, _)| kept(p));
+            (points, values) = seen.map(|(p, value)| (*p, *value)).unzip();
+        }
         let [x, y, z] = [0, 1, 2].map(|axis| points.iter().map(|p| p[axis]).collect::<Vec<f64>>());
         let particles =
             ParticlesView { positions: Points::new(&x, &y, &z), values: &values, radius: self.radius };

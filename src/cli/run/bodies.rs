@@ -1,10 +1,12 @@
 //! The obstacles of a run as sharp meshes: one for each body if all stand still, one for every frame and body if any of
-//! them moves.
+//! them moves. A body that moves without deformation takes its mesh along, as long as it lies whole within the box.
+
+use std::sync::OnceLock;
 
 use super::super::args::Run;
 use super::super::mesh::{hidden, no_grid};
 use super::super::{Failure, note};
-use rfm::geom::Aabb;
+use rfm::geom::{Aabb, Placement};
 use rfm::mesh::{self, Grid, Mesh, Resolution, dual_contouring};
 use rfm::{Experiment, Solid};
 
@@ -13,7 +15,9 @@ pub(in crate::cli) struct Bodies {
     solids: Vec<Solid>,
     domain: Aabb,
     /// Number of mesh cells along the longest side of each solid.
-    pub(super) cells: usize,
+    cells: usize,
+    /// The mesh of each solid at the time 0; `None` if it has none, or is deformed.
+    carried: Vec<OnceLock<Option<Mesh>>>,
 }
 
 impl Bodies {
@@ -24,7 +28,13 @@ impl Bodies {
 
     /// Solids in a box, to be meshed with so many cells along the longest side of each.
     pub fn of(solids: Vec<Solid>, domain: Aabb, cells: usize) -> Self {
-        Self { solids, domain, cells }
+        let carried = vec![OnceLock::new(); solids.len()];
+        Self { solids, domain, cells, carried }
+    }
+
+    /// These bodies with at most so many cells.
+    pub fn coarsened(self, cells: usize) -> Self {
+        Self::of(self.solids, self.domain, self.cells.min(cells))
     }
 
     pub fn is_empty(&self) -> bool {
@@ -59,7 +69,54 @@ impl Bodies {
 
     /// The mesh of each solid at a time, s, cut off at the box.
     pub fn meshes_at(&self, time: f64) -> Result<Vec<Mesh>, Failure> {
-        self.solids.iter().map(|solid| self.mesh_of(&solid.at(time))).collect()
+        let mesh_at = |(number, solid): (usize, &Solid)| {
+            // the mesh of what stands still is asked for once, and not kept
+            let carried = || Some((self.placement(number, time)?, self.at_start(number)?));
+            match if solid.moves() { carried() } else { None } {
+                Some((placement, mesh)) => Ok(mesh.moved(&placement)),
+                None => self.mesh_of(&solid.at(time)),
+            }
+        };
+        self.solids.iter().enumerate().map(mesh_at).collect()
+    }
+
+    /// The meshes of the time 0 that all solids take along; `None` if one of them takes none.
+    pub fn carried(&self) -> Option<Vec<&Mesh>> {
+        (0..self.solids.len()).map(|number| self.at_start(number)).collect()
+    }
+
+    /// Where these meshes are at a time, s; `None` if one of the solids has another mesh then.
+    pub fn placements(&self, time: f64) -> Option<Vec<Placement>> {
+        (0..self.solids.len()).map(|number| self.placement(number, time)).collect()
+    }
+
+    /// The mesh of a solid at the time 0, if it does not move or lies whole within the box.
+    fn at_start(&self, number: usize) -> Option<&Mesh> {
+        let make = || {
+            let solid = self.solids[number].at(0.0);
+            let is_whole = || solid.bounds().aabb().is_some_and(|bounds| self.holds(&bounds));
+            if !self.solids[number].moves() || is_whole() { self.mesh_of(&solid).ok() } else { None }
+        };
+        self.carried[number].get_or_init(make).as_ref()
+    }
+
+    /// Where the mesh of the time 0 is at a time, s; `None` if its solid is deformed, or does not lie whole within the
+    /// box at both times.
+    fn placement(&self, number: usize, time: f64) -> Option<Placement> {
+        let solid = &self.solids[number];
+        if !solid.moves() {
+            return Some(Placement::IDENTITY);
+        }
+        let placement = solid.placement(time)?;
+        let places = self.at_start(number)?.positions.iter();
+        let bounds = places.fold(Aabb::EMPTY, |all, p| all.including(placement.apply(*p)));
+        self.holds(&bounds).then_some(placement)
+    }
+
+    /// Whether a body with these bounds is not cut off at the box.
+    fn holds(&self, bounds: &Aabb) -> bool {
+        let room = self.domain.grown(Grid::BESIDE * self.domain.size().max_element());
+        room.union(bounds) == room
     }
 
     fn mesh_of(&self, solid: &Solid) -> Result<Mesh, Failure> {

@@ -73,6 +73,12 @@ impl Means {
         }
     }
 
+    /// The time from which values count, s, and the mean and standard error of a column, counted from 0.
+    pub fn of_column(&self, column: usize) -> Option<(f64, f64, Option<f64>)> {
+        let mean = (*self.mean.get(column)?)?;
+        Some((self.from, mean, self.error.get(column).copied().flatten()))
+    }
+
     /// These means, taken from a table that lacks so many samples.
     pub fn lacking(self, lost: usize) -> Self {
         Self { lost, ..self }

@@ -2,7 +2,9 @@
 
 use std::fmt::Write as _;
 
+use super::super::output::significant;
 use super::super::plot::{self, EvenAxis, HEIGHT, LEFT, Legend, RIGHT, SECOND_AXIS, TOP, WIDTH};
+use super::means::Means;
 use rfm::sph::Probe;
 
 const COLOURS: [&str; 6] = ["#1b6ca8", "#c05621", "#2f855a", "#6b46c1", "#b7791f", "#4a5568"];
@@ -32,9 +34,9 @@ impl Series {
     }
 }
 
-/// A plot with a line for each column over time. A line is interrupted where a value is missing. Without anything to show
-/// the plot is a sentence.
-pub(super) fn drawn(name: &str, probe: &Probe, table: &str) -> String {
+/// A plot with a line for each column over time, and with its mean, within its standard error, where one is asked
+/// for. A line is interrupted where a value is missing. Without anything to show the plot is a sentence.
+pub(super) fn drawn(name: &str, probe: &Probe, table: &str, means: Option<&Means>) -> String {
     let (times, series) = columns(probe, table);
     let mut out = plot::begin(name);
     if series.iter().all(Series::is_empty) {
@@ -55,20 +57,26 @@ pub(super) fn drawn(name: &str, probe: &Probe, table: &str) -> String {
     }
     let right = WIDTH - RIGHT - if units.len() > 1 { SECOND_AXIS } else { 0.0 };
     let x = EvenAxis::over(times.iter().copied(), LEFT, right);
-    let axes: Vec<EvenAxis> = units
+    let mut axes: Vec<EvenAxis> = units
         .iter()
         .map(|unit| {
             let own = series.iter().filter(shown).filter(|s| s.unit == *unit);
             EvenAxis::over(own.flat_map(|s| s.values.iter().copied()), HEIGHT - plot::BOTTOM, TOP)
         })
         .collect();
+    EvenAxis::with_common_zero(&mut axes);
     plot::even_grid(&mut out, &x, &axes[0], ["time, s", &axis_name(&series, units[0])], right);
     if let Some(second) = axes.get(1) {
         plot::right_axis(&mut out, second, &axis_name(&series, units[1]), right);
     }
     let mut legend = Legend::new();
-    for s in series.iter().filter(shown) {
+    for (k, s) in series.iter().enumerate().filter(|(_, s)| shown(s)) {
         let axis = usize::from(s.unit != units[0]);
+        // energies are shown from their start on
+        let mean = means.filter(|_| *probe != Probe::Energy).and_then(|means| means.of_column(k));
+        if let Some(mean) = mean {
+            draw_mean(&mut out, mean, (&x, right), &axes[axis], s.colour);
+        }
         let path = path(&times, &s.values, &x, &axes[axis]);
         // writing to a String cannot fail
         let _ = write!(
@@ -79,6 +87,14 @@ pub(super) fn drawn(name: &str, probe: &Probe, table: &str) -> String {
         legend.entry(&mut out, &s.name, |out, x, y| {
             plot::line_sample(out, (x, y), s.colour, DASHES[axis], false);
         });
+        for (t, v) in lone(&times, &s.values) {
+            plot::dot(&mut out, x.at(t), axes[axis].at(v), s.colour);
+        }
+        if let Some((from, mean, error)) = mean {
+            let within = error.map_or_else(String::new, |error| format!(" ± {}", significant(error, 1)));
+            legend.remark(&mut out, &format!("mean {}{within}", significant(mean, 3)));
+            legend.remark(&mut out, &format!("from {from} s on"));
+        }
     }
     legend.gap();
     if axes.len() > 1 {
@@ -136,6 +152,34 @@ fn axis_name(series: &[Series], unit: &str) -> String {
     }
 }
 
+/// Draws a mean as a line from a time on, and how far it may be off as a band around it.
+fn draw_mean(
+    out: &mut String,
+    (from, mean, error): (f64, f64, Option<f64>),
+    (x, right): (&EvenAxis, f64),
+    y: &EvenAxis,
+    colour: &str,
+) {
+    let (left, error) = (x.at(from), error.filter(|error| error.is_finite()).unwrap_or_default());
+    let clamped = |value: f64| y.at(value).clamp(TOP, HEIGHT - plot::BOTTOM);
+    let (top, bottom) = (clamped(mean + error), clamped(mean - error));
+    // writing to a String cannot fail
+    let _ = write!(
+        out,
+        r##"<rect x="{left:.1}" y="{top:.1}" width="{:.1}" height="{:.1}" fill="{colour}" fill-opacity="0.16"/><line x1="{left:.1}" y1="{at:.1}" x2="{right:.1}" y2="{at:.1}" stroke="{colour}" stroke-width="1" stroke-dasharray="2 2"/>"##,
+        (right - left).max(0.0),
+        bottom - top,
+        at = clamped(mean)
+    );
+}
+
+/// The values without neighbours, of which no line is seen.
+fn lone<'a>(times: &'a [f64], values: &'a [f64]) -> impl Iterator<Item = (f64, f64)> + 'a {
+    let is_there = |k: usize| values.get(k).is_some_and(|v| v.is_finite());
+    let is_lone = move |k: &usize| is_there(*k) && !is_there(k.wrapping_sub(1)) && !is_there(k + 1);
+    (0..times.len().min(values.len())).filter(is_lone).map(|k| (times[k], values[k]))
+}
+
 fn path(times: &[f64], values: &[f64], x: &EvenAxis, y: &EvenAxis) -> String {
     let mut path = String::new();
     let mut pen_down = false;
@@ -159,10 +203,29 @@ mod tests {
     }
 
     #[test]
+    fn a_single_sample_is_a_dot_and_a_mean_has_a_band() {
+        let asked = rfm::lower::AskedMean { from: 1.0, known: Vec::new(), torque: false };
+        let probe = Probe::Pressure { at: glam::DVec3::ZERO };
+        let table = "time,pressure\n0,5\n1,7\n2,8\n3,6\n4,9\n";
+        let means = Means::of("p", &probe, &asked, &rows(table));
+        let svg = drawn("p", &probe, table, Some(&means));
+        assert!(
+            svg.contains("fill-opacity") && svg.contains(">mean 7.667") && svg.contains(">from 1 s on"),
+            "{svg}"
+        );
+        assert!(!svg.contains("<circle"));
+        let one = drawn("p", &probe, "time,pressure\n0,1000\n", None);
+        assert_eq!(one.matches("<circle").count(), 1);
+        // beside a gap, too
+        let gap = drawn("p", &probe, "time,pressure\n0,1\n1,2\n2,nan\n3,4\n4,nan\n", None);
+        assert_eq!(gap.matches("<circle").count(), 1);
+    }
+
+    #[test]
     fn a_plot_is_interrupted_where_values_are_missing() {
         let probe = Probe::Velocity { at: glam::DVec3::ZERO };
         let table = "time [s],…\n0,nan,1,2\n1,2,nan,3\n2,3,1,4\n3,4,1,5\n";
-        let svg = drawn("a<b", &probe, table);
+        let svg = drawn("a<b", &probe, table, None);
         assert_eq!(paths(&svg), [(1, 2), (2, 1), (1, 3)]);
         assert!(svg.contains("a&lt;b") && svg.contains(">velocity, m/s<"));
     }
@@ -175,7 +238,7 @@ mod tests {
             ("time [s],pressure [Pa]\n", "no values"),
             ("time [s],pressure [Pa]\n0,0\n1,nan\n2,0\n", "zero at all times: pressure"),
         ] {
-            let svg = drawn("p", &probe, table);
+            let svg = drawn("p", &probe, table, None);
             assert!(svg.contains(says) && paths(&svg).is_empty() && !svg.contains("<line"), "{svg}");
         }
     }
@@ -183,7 +246,7 @@ mod tests {
     #[test]
     fn forces_and_torques_have_axes_of_their_own() {
         let probe = Probe::Force { obstacle: 0, about: glam::DVec3::ZERO };
-        let svg = drawn("f", &probe, "time\n0,1,2,3,1e-3,0,nan\n1,4,5,6,2e-3,0,nan\n");
+        let svg = drawn("f", &probe, "time\n0,1,2,3,1e-3,0,nan\n1,4,5,6,2e-3,0,nan\n", None);
         assert_eq!(paths(&svg).len(), 4);
         for says in
             [">force, N<", ">torque, N·m<", "0.0020", "torque y: zero at all times", "torque z: no values"]
@@ -194,7 +257,7 @@ mod tests {
 
     #[test]
     fn energies_are_counted_from_the_start_where_only_differences_mean_anything() {
-        let svg = drawn("e", &Probe::Energy, "time\n0,0,1000,0,1000\n1,5,995,0,1000\n2,8,991,0,999\n");
+        let svg = drawn("e", &Probe::Energy, "time\n0,0,1000,0,1000\n1,5,995,0,1000\n2,8,991,0,999\n", None);
         assert!(svg.contains("potential − start") && svg.contains(">energy, J<"), "{svg}");
         assert!(!svg.contains("1000"), "{svg}");
     }

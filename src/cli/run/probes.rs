@@ -119,9 +119,11 @@ impl Probes {
     pub fn plot(&self) -> Result<(), Failure> {
         for recorder in &self.stated {
             let text = recorder.text()?;
+            let means = recorder.means(&text);
             for ending in ["svg", "png"] {
                 let path = recorder.path.with_extension(ending);
-                let picture = plot::end(drawn(&recorder.name, &recorder.gauge.probe, &text), &path)?;
+                let picture =
+                    plot::end(drawn(&recorder.name, &recorder.gauge.probe, &text, means.as_ref()), &path)?;
                 output::write(&path, |out| out.write_all(&picture))?;
             }
         }
@@ -132,9 +134,9 @@ impl Probes {
     pub fn means(&self) -> Result<Vec<Means>, Failure> {
         let mut means = Vec::new();
         for recorder in &self.stated {
-            let Some(asked) = &recorder.mean else { continue };
-            let rows = rows(&recorder.text()?);
-            means.push(Means::of(&recorder.name, &recorder.gauge.probe, asked, &rows).lacking(recorder.lost));
+            if recorder.mean.is_some() {
+                means.extend(recorder.means(&recorder.text()?));
+            }
         }
         Ok(means)
     }
@@ -163,6 +165,12 @@ impl Recorder {
         let clock = Every::after(every, if past.is_new() { -every } else { simulation.time() });
         let (samples, lost) = (past.kept.lines().count(), past.lost);
         Ok(Self { name: name.to_string(), gauge, mean: None, clock, path, samples, lost, file })
+    }
+
+    /// The means that the scene asks for, of the rows of a table.
+    fn means(&self, table: &str) -> Option<Means> {
+        let means = Means::of(&self.name, &self.gauge.probe, self.mean.as_ref()?, &rows(table));
+        Some(means.lacking(self.lost))
     }
 
     /// The table so far.

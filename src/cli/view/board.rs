@@ -18,6 +18,8 @@ const LOOK: Duration = Duration::from_millis(500);
 pub(super) enum Topic {
     Setting,
     Mesh,
+    /// The mesh of what is only moved. It is sent after that of one instant: a page that gets that one forgets this.
+    Carried,
     Field,
     Slice,
     Frame,
@@ -25,13 +27,24 @@ pub(super) enum Topic {
     Status,
 }
 
+/// How many topics there are.
+const TOPICS: usize = 8;
+
 impl Topic {
-    const ALL: [Self; 7] =
-        [Self::Setting, Self::Mesh, Self::Field, Self::Slice, Self::Frame, Self::Plots, Self::Status];
+    const ALL: [Self; TOPICS] = [
+        Self::Setting,
+        Self::Mesh,
+        Self::Carried,
+        Self::Field,
+        Self::Slice,
+        Self::Frame,
+        Self::Plots,
+        Self::Status,
+    ];
 
     /// Whether the page says when it has taken such a message.
     pub fn is_answered(self) -> bool {
-        matches!(self, Self::Mesh | Self::Slice | Self::Frame)
+        matches!(self, Self::Mesh | Self::Carried | Self::Slice | Self::Frame)
     }
 }
 
@@ -52,7 +65,7 @@ pub(super) struct Status {
 struct News {
     setting: Option<Setting>,
     /// For each topic the newest message, with the number of messages of the topic so far.
-    newest: [(u64, Option<Message>); 7],
+    newest: [(u64, Option<Message>); TOPICS],
 }
 
 /// The newest of everything that pages are told.
@@ -74,7 +87,7 @@ impl Drop for OpenPage<'_> {
 }
 
 /// What a page has been sent: for each topic the number of its newest message.
-pub(super) type Sent = [u64; 7];
+pub(super) type Sent = [u64; TOPICS];
 
 impl Board {
     /// Counts a page as open until what is returned is dropped.

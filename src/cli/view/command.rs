@@ -21,6 +21,8 @@ pub(super) enum Command {
     Try { name: String, value: f64 },
     /// Begin again with another value of a param.
     Set { name: String, value: f64 },
+    /// Show another solid of a file without a scene.
+    Solid { name: String },
     /// Let gravity act in this direction from now on, m/s².
     Gravity { vector: [f64; 3] },
     /// Show ω in the plane across an axis at a coordinate, m; in none without an axis.
@@ -61,6 +63,7 @@ pub(super) fn settled(commands: Vec<Command>) -> Vec<Command> {
             | (Command::Set { name, .. }, Command::Set { name: again, .. }) => name == again,
             (Command::Gravity { .. }, Command::Gravity { .. })
             | (Command::Slice { .. }, Command::Slice { .. })
+            | (Command::Solid { .. }, Command::Solid { .. })
             | (Command::Speed { .. }, Command::Speed { .. }) => true,
             _ => false,
         })

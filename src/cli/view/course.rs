@@ -11,7 +11,7 @@ use super::way::Way;
 use rfm::geom::Aabb;
 use rfm::mesh::{Mesh, split_creases};
 use rfm::sph::Simulation;
-use rfm::view::{Frame, FrameHead, Lattice, pack_frame, pack_mesh};
+use rfm::view::{Frame, FrameHead, Lattice, MeshRole, columns, pack_frame, pack_mesh, pack_parts};
 use rfm::{Experiment, Solid};
 
 /// Most particles of a scene that begins to run by itself.
@@ -111,13 +111,27 @@ impl Course {
         }
     }
 
-    /// The block of the mesh of all solids as they stand now.
-    pub fn mesh(&self, run: u64) -> Result<Vec<u8>, String> {
-        let bodies = match self {
+    fn bodies(&self) -> &Bodies {
+        match self {
             Self::Fluid(flow) => &flow.bodies,
             Self::Solid(motion) => &motion.bodies,
-        };
-        mesh_at(bodies, self.time(), run)
+        }
+    }
+
+    /// The block of the mesh of all solids as they stand now.
+    pub fn mesh(&self, run: u64) -> Result<Vec<u8>, String> {
+        mesh_at(self.bodies(), self.time(), run)
+    }
+
+    /// Whether frames say now where all solids are.
+    pub fn is_carried(&self) -> bool {
+        self.bodies().placements(self.time()).is_some()
+    }
+
+    /// The block of the mesh that all solids take along, if they do.
+    pub fn carried(&self, run: u64) -> Option<Vec<u8>> {
+        let sharp: Vec<Mesh> = self.bodies().carried()?.into_iter().map(split_creases).collect();
+        Some(pack_parts(&sharp, MeshRole::Carried, 0.0, run))
     }
 
     /// The block of the present instant.
@@ -199,15 +213,30 @@ impl Flow {
         let places = order.iter().map(|&i| particles.position.get(i));
         let (frame, ranges) = Frame::of(&self.lattice, places, &arrays.each_ref().map(Vec::as_slice));
         let (time, step) = (self.simulation.time(), Some(self.simulation.steps()));
-        pack_frame(&FrameHead { time, step, ranges, mesh: None, run, motion: None }, &frame, None)
+        let poses = poses(&self.bodies, time);
+        pack_frame(&FrameHead { step, ranges, poses, run, ..FrameHead::at(time) }, &frame, None)
     }
 
     fn details(&self, spent: f64) -> String {
         let speed = if spent > 0.0 { format!(" · {:.1} ms per step", 1e3 * spent) } else { String::new() };
         let found = self.simulation.findings();
         let found = found.last().map_or_else(String::new, |(_, message)| format!(" · {message}"));
-        format!(" · step {}{speed}{found}", self.simulation.steps())
+        let until = self.experiment.scene().run.until;
+        let past = if self.simulation.time() > until {
+            format!(" · past the end of the run, {until} s")
+        } else {
+            String::new()
+        };
+        format!(" · step {}{speed}{past}{found}", self.simulation.steps())
     }
+}
+
+/// Where all solids are at a time, s; none if one of them is not just carried along.
+fn poses(bodies: &Bodies, time: f64) -> Vec<[f64; 12]> {
+    if !bodies.move_about() {
+        return Vec::new();
+    }
+    bodies.placements(time).unwrap_or_default().iter().map(columns).collect()
 }
 
 /// The block of the mesh of all solids at a time, s.
@@ -223,8 +252,7 @@ impl Motion {
     }
 
     fn frame(&self, run: u64) -> Vec<u8> {
-        let head =
-            FrameHead { time: self.time, step: None, ranges: Vec::new(), mesh: None, run, motion: None };
+        let head = FrameHead { poses: poses(&self.bodies, self.time), run, ..FrameHead::at(self.time) };
         pack_frame(&head, &Frame::default(), None)
     }
 }

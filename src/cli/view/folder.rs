@@ -1,6 +1,6 @@
 //! The folder of a run as a page.
 //!
-//! Frames are read twice: first for their ranges, then to be written, so that only one is in memory at a time.
+//! Frames are read for their ranges, and again to be written, so that only one is in memory at a time.
 
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
@@ -8,13 +8,16 @@ use std::path::{Path, PathBuf};
 use super::super::failure::Failure;
 use super::super::output::counted;
 use super::super::saved::{self, RunFigures};
+use super::super::surfaces;
 use super::super::survey::{Survey, is_velocity};
 use super::options::View;
 use super::plots;
 use rfm::fluid_surface::{FrameEntry, read_arrays, read_mesh};
-use rfm::mesh::split_creases;
+use rfm::geom::Aabb;
+use rfm::mesh::{Mesh, split_creases};
 use rfm::view::{
-    Array, Corners, Frame, FrameHead, Lattice, Levels, Motion, Page, Setting, VELOCITY, pack_frame, pack_mesh,
+    Array, Corners, Frame, FrameHead, Lattice, Levels, MeshRole, Motion, Page, Setting, Sizes, VELOCITY,
+    coarse, columns, pack_frame, pack_parts, pose,
 };
 
 /// A run in its folder.
@@ -24,6 +27,8 @@ pub(super) struct SavedRun {
     /// Files of the obstacles' meshes, and for each frame the number of its mesh.
     meshes: Vec<PathBuf>,
     mesh_of: Vec<Option<usize>>,
+    /// For each frame the file of the fluid's surface, where there is one.
+    surfaces: Vec<Option<PathBuf>>,
     /// Name and range of each array of a page: the numbers at particles, then the components of the velocity.
     arrays: Vec<(String, Levels)>,
     /// The number of particles of all frames together.
@@ -41,6 +46,7 @@ impl SavedRun {
         let figures = RunFigures::read(&folder.join("summary.json")).ok();
         let survey = Survey::of(folder, &entries)?;
         let (meshes, mesh_of) = saved::obstacles(folder, &entries)?;
+        let surfaces = surfaces::there_are(folder, &entries)?;
         let domain = survey.domain(figures.as_ref());
         let mut arrays = survey.arrays.clone();
         let velocity = survey.velocity.into_iter();
@@ -51,16 +57,18 @@ impl SavedRun {
             facts: facts(&entries, &survey, figures.as_ref()),
             live: false,
             moves: false,
+            has_surface: surfaces.iter().any(Option::is_some),
             domain: Corners::from(&domain),
             lattice: Some(Corners::from(lattice.bounds())),
             radius: survey.radius(figures.as_ref(), entries.len()),
             arrays: arrays.iter().map(|(name, range)| Array::named(name, Some(*range))).collect(),
+            solids: Vec::new(),
             gravity: None,
             params: Vec::new(),
             plots: Some(plots::saved(folder)),
         };
         let (folder, particles) = (folder.to_path_buf(), survey.particles);
-        Ok(Self { folder, entries, meshes, mesh_of, arrays, particles, setting, lattice })
+        Ok(Self { folder, entries, meshes, mesh_of, surfaces, arrays, particles, setting, lattice })
     }
 
     pub fn frames(&self) -> usize {
@@ -72,28 +80,38 @@ impl SavedRun {
         self.particles
     }
 
-    /// Writes the page.
-    pub fn write(&self, out: &mut dyn Write) -> io::Result<()> {
+    /// Writes the page. Surfaces of the fluid have the detail of half the particles' spacing in it.
+    pub fn write(&self, out: &mut dyn Write) -> io::Result<Sizes> {
         let mut page = Page::begin(out, &self.setting)?;
-        let mut written = 0;
+        let (mut meshes, mut surfaces) = (Meshes::default(), 0);
         let (mut before, mut time) = (None::<Frame>, 0.0);
-        for ((_, entry), mesh) in self.entries.iter().zip(&self.mesh_of) {
-            while mesh.is_some_and(|mesh| written <= mesh) {
-                let file = std::fs::read(&self.meshes[written])?;
-                let mesh = read_mesh(&file).map_err(io::Error::other)?;
-                page.block(&pack_mesh(&split_creases(&mesh), entry.time, 0))?;
-                written += 1;
+        for (k, (_, entry)) in self.entries.iter().enumerate() {
+            let file = self.mesh_of[k].map(|mesh| (mesh, self.meshes[mesh].as_path()));
+            if let Some(block) = meshes.next(file, entry.time)? {
+                page.mesh(&block)?;
             }
+            let surface = match &self.surfaces[k] {
+                Some(file) => {
+                    let mesh = read_mesh(&std::fs::read(file)?).map_err(io::Error::other)?;
+                    let mesh = coarse(&mesh, self.setting.radius);
+                    page.mesh(&pack_parts(&[mesh], MeshRole::Fluid, entry.time, 0))?;
+                    surfaces += 1;
+                    Some(surfaces - 1)
+                }
+                None => None,
+            };
             let frame = self.frame(entry)?;
             let head = FrameHead {
                 time: entry.time,
                 step: None,
                 ranges: self.arrays.iter().map(|(_, range)| *range).collect(),
-                mesh: *mesh,
+                mesh: meshes.written.checked_sub(1),
+                poses: meshes.poses.clone(),
+                surface,
                 run: 0,
                 motion: self.motion(entry.time - time),
             };
-            page.block(&pack_frame(&head, &frame, before.as_ref()))?;
+            page.frame(&pack_frame(&head, &frame, before.as_ref()))?;
             (before, time) = (Some(frame), entry.time);
         }
         page.end()
@@ -127,6 +145,72 @@ impl SavedRun {
             levels: self.arrays.iter().map(levels).collect::<io::Result<_>>()?,
         })
     }
+}
+
+/// The meshes of the obstacles as they are written: one that is that of before, only elsewhere, is not written again.
+#[derive(Default)]
+struct Meshes {
+    /// How many are written.
+    written: usize,
+    /// The number of the file that was read last.
+    read: Option<usize>,
+    /// The parts of the mesh that was written last.
+    last: Vec<Mesh>,
+    /// Where its parts are now; empty if they are where they were.
+    poses: Vec<[f64; 12]>,
+}
+
+/// A page draws each part of a mesh for itself: of more parts it is given one mesh for each frame.
+const MOST_PARTS: f64 = 1000.0;
+
+/// How far a part may lie from its mesh, as a part of the longest side of all: half a step of the 16 bits of
+/// coordinates.
+const BESIDE: f64 = 0.5 / 65534.0;
+
+impl Meshes {
+    /// Goes on to a frame with the mesh of a file, which has a number: the block of the mesh, if it is a new one.
+    fn next(&mut self, file: Option<(usize, &Path)>, time: f64) -> io::Result<Option<Vec<u8>>> {
+        let Some((number, path)) = file.filter(|(number, _)| self.read != Some(*number)) else {
+            return Ok(None);
+        };
+        self.read = Some(number);
+        let parts = parts_of(&std::fs::read(path)?)?;
+        if let Some(poses) = self.poses_of(&parts) {
+            self.poses = poses;
+            return Ok(None);
+        }
+        let sharp: Vec<Mesh> = parts.iter().map(split_creases).collect();
+        (self.last, self.poses) = (parts, Vec::new());
+        self.written += 1;
+        Ok(Some(pack_parts(&sharp, MeshRole::Solids, time, 0)))
+    }
+
+    /// Where the parts of the last mesh are, if these are no other ones.
+    fn poses_of(&self, parts: &[Mesh]) -> Option<Vec<[f64; 12]>> {
+        if self.written == 0 || parts.len() != self.last.len() {
+            return None;
+        }
+        let bounds = self.last.iter().flat_map(|part| &part.positions);
+        let side = bounds.fold(Aabb::EMPTY, |all, p| all.including(*p)).size().max_element();
+        let of = |(then, now): (&Mesh, &Mesh)| {
+            let is_same = then.triangles == now.triangles;
+            is_same.then(|| pose(&then.positions, &now.positions, BESIDE * side)).flatten()
+        };
+        let placements = self.last.iter().zip(parts).map(of);
+        placements.map(|placement| Some(columns(&placement?))).collect()
+    }
+}
+
+/// The bodies of the mesh of a file, told apart by its array `body` if it has one.
+fn parts_of(file: &[u8]) -> io::Result<Vec<Mesh>> {
+    let whole = read_mesh(file).map_err(io::Error::other)?;
+    let (_, arrays) = read_arrays(file).map_err(io::Error::other)?;
+    let Some(body) = arrays.into_iter().find(|array| array.name == "body" && array.components == 1) else {
+        return Ok(vec![whole]);
+    };
+    let last = body.values.iter().copied().fold(0.0, f64::max);
+    let parts = if last < MOST_PARTS { whole.divided(&body.values, last as usize + 1) } else { None };
+    Ok(parts.unwrap_or_else(|| vec![whole]))
 }
 
 fn facts(entries: &[(usize, FrameEntry)], survey: &Survey, figures: Option<&RunFigures>) -> String {

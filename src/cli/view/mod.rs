@@ -78,21 +78,28 @@ pub(super) fn run(shared: &Shared, options: &View) -> Result<(), Failure> {
 
 /// Writes the page of a run.
 fn save(shared: &Shared, run: &SavedRun, target: &Path) -> Result<(), Failure> {
-    output::write(target, |out| run.write(out))?;
+    let mut sizes = None;
+    output::write(target, |out| {
+        sizes = Some(run.write(out)?);
+        Ok(())
+    })?;
     let bytes = std::fs::metadata(target).map(|file| file.len())?;
     let (frames, particles) = (run.frames(), run.particles());
     if shared.json {
         return output::json(&serde_json::json!({
             "schema": 1, "file": target.display().to_string(), "frames": frames, "bytes": bytes,
+            "bytes_of_frames": sizes.map(|sizes| sizes.frames), "bytes_of_meshes": sizes.map(|sizes| sizes.meshes),
             "bytes_per_particle_and_frame": bytes as f64 / particles.max(1) as f64,
         }));
     }
-    say!(
-        "{}, {:.2} MB, {:.1} bytes per particle and frame",
-        output::counted(frames, "frame"),
-        bytes as f64 / 1e6,
-        bytes as f64 / particles.max(1) as f64
-    );
+    let split = sizes.map_or_else(String::new, |sizes| {
+        let per_particle = sizes.frames as f64 / particles.max(1) as f64;
+        format!(
+            ": {per_particle:.1} bytes per particle and frame, {:.2} MB of meshes",
+            sizes.meshes as f64 / 1e6
+        )
+    });
+    say!("{}, {:.2} MB{split}", output::counted(frames, "frame"), bytes as f64 / 1e6);
     say!("written to {}: it opens in any browser, without a network", target.shown());
     Ok(())
 }

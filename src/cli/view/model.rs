@@ -26,6 +26,8 @@ pub(super) struct Subject {
     pub path: PathBuf,
     scene: Option<String>,
     solid: Option<String>,
+    /// The solid that a page has chosen of a file without a scene.
+    chosen: Option<String>,
     cells: usize,
     define: BTreeMap<String, f64>,
     dimensions: BTreeMap<String, Dimension>,
@@ -74,6 +76,7 @@ impl Subject {
             path: options.subject.clone(),
             scene: options.scene.clone(),
             solid: options.solid.clone(),
+            chosen: None,
             cells: options.mesh_cells,
             define: shared.define.iter().map(|given| (given.name.clone(), given.value)).collect(),
             dimensions: shared
@@ -101,6 +104,12 @@ impl Subject {
     /// Reads the files that the file names anew when it is next checked.
     pub fn forget(&self) {
         self.files.forget();
+    }
+
+    /// Shows another solid of a file without a scene from now on.
+    /// Returns what was chosen before.
+    pub fn choose(&mut self, solid: Option<String>) -> Option<String> {
+        std::mem::replace(&mut self.chosen, solid)
     }
 
     pub fn title(&self) -> String {
@@ -183,9 +192,19 @@ impl Subject {
         container.chain(obstacles).map(compile).collect()
     }
 
+    /// The names of the solids of a file without a scene, that which is shown first.
+    fn solids_to_choose(&self, checked: &Checked) -> Vec<String> {
+        let Ok(shown) = self.solid_of(checked) else { return Vec::new() };
+        let names = checked.program.module().solids.iter().map(|solid| solid.name.clone());
+        let others = names.filter(|name| name != shown.name());
+        std::iter::once(shown.name().to_string()).chain(others).collect()
+    }
+
     fn solid_of(&self, checked: &Checked) -> Result<Solid, String> {
         let module = checked.program.module();
-        let name = match (&checked.solid, &module.solids[..]) {
+        let chosen =
+            self.chosen.as_ref().filter(|name| module.solids.iter().any(|solid| solid.name == **name));
+        let name = match (chosen.or(checked.solid.as_ref()), &module.solids[..]) {
             (Some(name), _) => name,
             (None, [.., last]) => &last.name,
             (None, []) => return Err("the file defines neither a solid nor a scene".into()),
@@ -235,9 +254,14 @@ impl Subject {
             live: true,
             domain: Corners::from(bounds),
             moves: matches!(course, Some(Course::Solid(_))),
+            has_surface: false,
             lattice: flow.map(|flow| Corners::from(flow.lattice.bounds())),
             radius: flow.map_or(0.0, |flow| 0.5 * flow.experiment.parameters().spacing()),
             arrays: if scene.is_some() { arrays.to_vec() } else { Vec::new() },
+            solids: match (checked, scene) {
+                (Some(checked), None) => self.solids_to_choose(checked),
+                (Some(_) | None, _) => Vec::new(),
+            },
             gravity: scene.and_then(|scene| match &scene.gravity {
                 Gravity::Still(gravity) => Some(gravity.to_array()),
                 Gravity::Turning(_) | Gravity::Field(_) => None,

@@ -32,6 +32,9 @@ const FRAME: Duration = Duration::from_millis(33);
 /// Time of the clock between plots.
 const PLOTS: Duration = Duration::from_millis(250);
 
+/// A file that is not there so many times in a row, every [`LOOK`], is gone.
+const MISSED: u32 = 4;
+
 /// Pause of a simulation that is ahead of the clock.
 const BREATH: Duration = Duration::from_millis(4);
 
@@ -42,6 +45,8 @@ pub(super) struct Session {
     /// Values of params that pages have set.
     values: BTreeMap<String, f64>,
     stamp: Stamp,
+    /// How often the file was not there when it was looked for.
+    missed: u32,
     checked: Option<Checked>,
     /// What goes on in time; `None` if the file has nothing that does.
     course: Option<Course>,
@@ -63,6 +68,8 @@ struct Pace {
     from: (Instant, f64),
     seconds_per_step: f64,
     mesh: MeshShown,
+    /// The run whose mesh is carried along and has been shown.
+    carried: Option<u64>,
     /// When the plots were told.
     plots: Instant,
 }
@@ -85,6 +92,7 @@ impl Session {
             board,
             values: BTreeMap::new(),
             stamp: None,
+            missed: 0,
             checked: None,
             course: None,
             status: Status { speed: 1.0, ..Status::default() },
@@ -95,6 +103,7 @@ impl Session {
                 from: (now, 0.0),
                 seconds_per_step: 0.0,
                 mesh: MeshShown { at: now, took: Duration::ZERO, time: f64::NAN },
+                carried: None,
                 plots: now,
             },
             run: 0,
@@ -185,6 +194,16 @@ impl Session {
             }
             // a page that has not yet heard of a change of the file
             Command::Try { .. } | Command::Set { .. } => {}
+            Command::Solid { name } => {
+                let before = self.subject.choose(Some(name));
+                self.load();
+                if self.status.error.is_some() {
+                    self.subject.choose(before);
+                } else {
+                    self.status.playing = self.course.as_ref().is_some_and(Course::begins_by_itself);
+                    self.follow_clock();
+                }
+            }
             Command::Gravity { vector } => {
                 let gravity = DVec3::from_array(vector);
                 if gravity.is_finite() {
@@ -217,11 +236,25 @@ impl Session {
 
     fn reload_if_changed(&mut self) {
         let stamp = self.subject.stamp();
-        // an editor may have taken the file away for a moment
-        if stamp.is_none() || stamp == self.stamp {
+        if stamp.is_none() {
+            // an editor may have taken the file away for a moment
+            self.missed += 1;
+            if self.missed == MISSED {
+                let title = self.subject.title();
+                self.status.error =
+                    Some(format!("`{title}` is not there any more: the last picture of it remains"));
+                // what comes back is read
+                self.stamp = None;
+                self.tell();
+            }
+            return;
+        }
+        self.missed = 0;
+        if stamp == self.stamp {
             return;
         }
         self.stamp = stamp;
+        self.announce("reading the file");
         self.subject.forget();
         if let Ok(plain) = self.subject.checked(&BTreeMap::new()) {
             self.values.retain(|name, _| plain.has_param(name));
@@ -245,8 +278,11 @@ impl Session {
         });
         match made {
             Ok((checked, (mesh, standing))) => {
+                // it takes the place of what was carried along
+                self.board.clear(Topic::Carried);
                 self.board.set_block(Topic::Mesh, mesh);
                 self.pace.mesh.time = f64::NAN;
+                self.pace.carried = None;
                 self.status.error = None;
                 let time = standing.time;
                 self.standing = Some(standing);
@@ -264,10 +300,9 @@ impl Session {
 
     /// Reads the file and begins a run; if that is not possible, the last one remains.
     fn load(&mut self) {
-        self.status.text = "starting".into();
         // what was wrong may have been mended, and looking takes a while
         self.status.error = None;
-        self.tell();
+        self.announce("compiling");
         let values = self.values.clone();
         let (Some(checked), Some(standing)) = (self.show_mesh(&values, Detail::Lasting), &self.standing)
         else {
@@ -276,6 +311,10 @@ impl Session {
             return;
         };
         let bounds = standing.domain;
+        if self.values.is_empty() {
+            // no slider has moved it
+            self.status.latency = None;
+        }
         self.board.set_field(&Field::of(&checked, &standing.solids));
         let course = match &checked.scene {
             Some(scene) => self.subject.start(&checked, scene).map(Some),
@@ -427,9 +466,20 @@ impl Session {
             return;
         }
         let began = Instant::now();
-        match course.mesh(self.run) {
-            Ok(mesh) => self.board.set_block(Topic::Mesh, mesh),
-            Err(error) => self.status.error = Some(error),
+        if course.is_carried() {
+            if self.pace.carried != Some(self.run)
+                && let Some(mesh) = course.carried(self.run)
+            {
+                self.board.set_block(Topic::Carried, mesh);
+                self.pace.carried = Some(self.run);
+            }
+        } else {
+            // a page forgets what was carried as soon as it is given this
+            self.pace.carried = None;
+            match course.mesh(self.run) {
+                Ok(mesh) => self.board.set_block(Topic::Mesh, mesh),
+                Err(error) => self.status.error = Some(error),
+            }
         }
         self.show_slice(time);
         self.pace.mesh = MeshShown { at: Instant::now(), took: began.elapsed(), time };
@@ -438,11 +488,18 @@ impl Session {
     fn show_frame(&mut self) {
         // while it plays, meshes of what moves may take as much time as frames do
         let MeshShown { at, took, .. } = self.pace.mesh;
-        if !self.status.playing || at.elapsed() > 2 * took {
+        let is_new = self.pace.carried.is_none() && self.course.as_ref().is_some_and(Course::is_carried);
+        if !self.status.playing || is_new || at.elapsed() > 2 * took {
             self.show_obstacles();
         }
         let Some(course) = &self.course else { return };
         self.board.set_block(Topic::Frame, course.frame(self.run));
+    }
+
+    /// Tells what takes a while from now on.
+    fn announce(&mut self, doing: &str) {
+        self.status.text = doing.into();
+        self.board.set_status(&self.status);
     }
 
     fn tell(&mut self) {

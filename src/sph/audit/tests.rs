@@ -107,6 +107,24 @@ fn energy_from_nowhere_is_found_and_stops_a_run() {
 }
 
 #[test]
+fn what_a_low_wave_gains_is_compared_with_its_motion() {
+    let mut simulation = column(Wcsph::default().into(), 0.1);
+    simulation.step().unwrap();
+    // a little more than 0.2 % of g·0.4 m, and nothing moved before: the water at rest was given a speed
+    let mut checkpoint = simulation.checkpoint();
+    let mut column = checkpoint.get("velocity y").unwrap().to_vec();
+    column.iter_mut().for_each(|v| *v += 0.16);
+    checkpoint.set("velocity y", column);
+    simulation = Simulation::resume(simulation.parameters().clone(), &checkpoint, TANK, Vec::new()).unwrap();
+    simulation.step().unwrap();
+    let excess = simulation.audit().energy_excess().unwrap();
+    assert!((0.002..0.01).contains(&excess), "{excess}");
+    let told = simulation.news();
+    let [(Finding::Energy, text)] = &told[..] else { panic!("{told:?}") };
+    assert!(text.contains("greatest energy of motion"), "{text}");
+}
+
+#[test]
 fn crowded_places_are_found_whatever_density_is_carried() {
     // particles that nothing pushes apart
     let dust = crate::sph::Paper { stiffness: 0.0, ..crate::sph::Paper::default() };

@@ -22,7 +22,7 @@ class Live {
         return;
       }
       const [head, planes] = opened(new Uint8Array(data));
-      const read = { mesh: meshOf, slice: sliceOf, frame: (head, planes) => frameOf(head, planes, null) }[head.kind];
+      const read = { mesh: meshOf, carried: meshOf, slice: sliceOf, frame: (head, planes) => frameOf(head, planes, null) }[head.kind];
       this.taken(head.kind, read(head, planes));
       // the next frame is sent when this one has been taken
       this.send({ do: "seen" });

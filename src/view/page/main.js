@@ -11,12 +11,14 @@ class Viewer {
     this.timeline = new Timeline();
     this.plots = new Plots(byId("plots"), (time) => this.seek(time));
     this.meshes = [];
+    this.surfaces = [];
+    this.carried = null;
     this.values = new Map();
     this.errors = [];
     this.run = { number: 0, playing: false, speed: 1 };
     this.stats = { draws: 0, milliseconds: 0 };
     this.look = {
-      colours: sceneColours(), obstacle: "opaque", surface: "automatic", particles: true, box: true, array: 0, map: "blue–yellow–red", fixed: null, blend: true,
+      colours: sceneColours(), obstacle: "opaque", surface: "automatic", water: "transparent", particles: !setting.has_surface, box: true, array: 0, map: "blue–yellow–red", fixed: null, blend: true,
       cutting: { axis: "none", part: 0.5, flipped: false, solid: true, fluid: true }, turns: false, gravityInRoom: true,
       slicing: { axis: "none", part: 0.5 }, arrows: false, arrowLength: 1, trails: false, trailFrames: 12,
     };
@@ -39,6 +41,9 @@ class Viewer {
     look.lattice = setting.lattice ?? setting.box;
     look.radius = setting.radius || 0;
     look.array = Math.min(look.array, Math.max(setting.arrays.length - 1, 0));
+    const isAnother = this.solid !== undefined && this.solid !== setting.solids[0];
+    this.solid = setting.solids[0];
+    if (isAnother) this.camera.frame(look.boxBounds);
     byId("title").textContent = document.title = setting.title;
     byId("facts").textContent = setting.facts;
     this.scene.setBox(setting.box);
@@ -57,9 +62,10 @@ class Viewer {
       this.camera.frame(look.boxBounds);
     }
     // controls in use stay as they are: only another set of them is built anew
-    const kind = JSON.stringify([setting.params.map(({ name, range, unit }) => [name, range, unit]), setting.arrays.map((array) => array.name)]);
+    const kind = JSON.stringify([setting.params.map(({ name, range, unit }) => [name, range, unit]), setting.arrays.map((array) => array.name), [...setting.solids].sort()]);
     if (kind !== this.kind) buildPanel(byId("panel"), this);
     else showParams(setting.params);
+    if (byId("solid")) byId("solid").value = setting.solids[0];
     this.kind = kind;
     this.changed();
   }
@@ -72,6 +78,7 @@ class Viewer {
       for (const block of blocksOf(await inflated(group.textContent))) {
         const [head, planes] = opened(block);
         if (head.kind === "mesh") this.meshes.push(meshOf(head, planes));
+        else if (head.kind === "surface") this.surfaces.push(meshOf(head, planes));
         else {
           before = frameOf(head, planes, before);
           this.timeline.add(before);
@@ -106,7 +113,10 @@ class Viewer {
         break;
       }
       case "mesh":
-        this.meshes = [content];
+        [this.meshes, this.carried] = [[content], null];
+        break;
+      case "carried":
+        this.carried = content;
         break;
       case "field":
         this.field = content;
@@ -314,7 +324,8 @@ class Viewer {
   free() {
     const [panel, transport, { look }] = [byId("panel"), byId("transport"), this];
     const bottom = transport.hidden ? 10 : innerHeight - transport.getBoundingClientRect().top;
-    const free = { left: 0, right: 0, top: 30, bottom, legend: 0 };
+    const free = { left: 0, right: 0, top: 30, bottom, legend: 0, title: 0 };
+    if (innerWidth <= 720) free.title = byId("facts").getBoundingClientRect().bottom;
     const plots = byId("plots");
     if (!plots.hidden && plots.children.length > 0 && innerWidth > 720) {
       free.legend = plots.getBoundingClientRect().right;
@@ -323,7 +334,11 @@ class Viewer {
     if (look.slicing.axis !== "none" && innerWidth > 720) free.left += 30;
     if (panel.hidden) return free;
     if (innerWidth > 720) free.right = innerWidth - panel.getBoundingClientRect().left;
-    else free.bottom = innerHeight - panel.getBoundingClientRect().top;
+    else {
+      // where there is no room beside the controls, they lie over the picture
+      const above = panel.getBoundingClientRect().top;
+      if (above > Math.max(innerHeight / 3, 200)) free.bottom = innerHeight - above;
+    }
     return free;
   }
 
@@ -346,7 +361,12 @@ class Viewer {
     scene.moving = this.dragging || timeline.playing;
     // a param that the formula has no uniform for is seen in the mesh alone
     Object.assign(look, { time: frames?.from.time ?? 0, values: this.values, onlyMesh: this.isTried });
-    scene.setMesh(this.meshes[frames?.from.mesh ?? 0] ?? null);
+    const poses = frames?.from.poses;
+    const carried = poses ? this.carried : null;
+    scene.setMesh("solid", carried ?? this.meshes[frames?.from.mesh ?? 0] ?? null, this.live && !carried ? null : poses);
+    // some frames of a run may have none
+    look.lacksSurface = this.setting.has_surface && look.water !== "hidden" && frames?.from.surface === undefined;
+    scene.setMesh("water", this.surfaces[frames?.from.surface ?? -1] ?? null);
     const view = camera.view();
     const page = size.map((x) => x / ratio);
     const projection = camera.projection(page, look.free);
@@ -363,7 +383,7 @@ class Viewer {
 
   /** The picture with its legend and title on a canvas of its own. */
   composed() {
-    const whole = { left: 0, right: 0, top: 20, bottom: 10, legend: 0 };
+    const whole = { left: 0, right: 0, top: 20, bottom: 10, legend: 0, title: 0 };
     this.draw(whole);
     const { canvas, look, camera, timeline } = this;
     const picture = element("canvas", { width: canvas.width, height: canvas.height });
@@ -453,7 +473,13 @@ class Viewer {
       ended: () => { this.dragging = false; this.changed(); },
       turns: () => look.turns,
     });
+    let wasNarrow = isNarrow();
     addEventListener("resize", () => {
+      if (isNarrow() && !wasNarrow) {
+        this.showPanel(false);
+        this.showPlots(false);
+      }
+      wasNarrow = isNarrow();
       if (!byId("panel").hidden) this.showPanel(true);
       this.changed();
     });
@@ -491,6 +517,7 @@ class Viewer {
       [["z"], "z", "look along the z axis", towards([0, 0, 1])],
       [["p"], "p", "parallel projection", clicked("parallel")],
       [["o"], "o", "obstacle: opaque, transparent, hidden", () => { nextOf("obstacle"); }],
+      [["f"], "f", "surface of the fluid: opaque, transparent, hidden", () => { nextOf("water"); }],
       [["c"], "c", "cut across x, y, z, or not", () => { nextOf("cut-axis"); }],
       [["a"], "a", "arrows of the velocity", clicked("arrows-shown")],
       [["t"], "t", "trails of the particles", clicked("trails-shown")],
@@ -524,6 +551,7 @@ const clicked = (id) => () => byId(id)?.click();
 /** Goes on to the next of a list of choices. */
 function nextOf(id) {
   const list = byId(id);
+  if (!list) return;
   list.selectedIndex = (list.selectedIndex + 1) % list.options.length;
   list.dispatchEvent(new Event("change"));
 }

@@ -10,9 +10,9 @@ function drawOverlay(context, size, ratio, look, camera, seen, caption) {
   context.textBaseline = "middle";
   if (look.box) drawLengths(context, page, look, seen);
   drawAxes(context, page, look, camera, seen);
-  if (look.legend) drawLegend(context, page, look);
   // above the legend of the colours stands what else there is to say
-  const height = legendHeight(page);
+  const height = legendHeight(page, look);
+  if (look.legend && height > 0) drawLegend(context, page, look, height);
   const left = look.free.legend + 18;
   let bottom = page[1] - look.free.bottom - 12 - (look.legend ? height + 32 : 0);
   if (look.arrows && look.velocity && look.legend) {
@@ -29,10 +29,14 @@ function drawOverlay(context, size, ratio, look, camera, seen, caption) {
   }
 }
 
-const legendHeight = (page) => Math.min(190, page[1] * 0.34);
+/** The height of a legend below the title; 0 where there is no room for one. */
+function legendHeight(page, look) {
+  const height = Math.min(190, page[1] * 0.34, page[1] - look.free.bottom - look.free.title - 40);
+  return height < 60 ? 0 : height;
+}
 
-function drawLegend(context, page, look) {
-  const [width, height] = [14, legendHeight(page)];
+function drawLegend(context, page, look, height) {
+  const width = 14;
   const [left, top] = [18 + look.free.legend, page[1] - look.free.bottom - height - 12];
   const { low, high } = look.range;
   for (let y = 0; y < height; y++) {

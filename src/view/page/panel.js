@@ -32,10 +32,13 @@ function buildPanel(place, viewer) {
   const again = () => viewer.changed();
   const groups = [];
   if (setting.params?.length) groups.push(paramsGroup(viewer));
-  if (setting.live) groups.push(boxGroup(viewer));
+  if (setting.live && (setting.arrays.length || setting.moves)) groups.push(boxGroup(viewer));
   if (setting.arrays.length) groups.push(colourGroup(viewer));
-  groups.push(group(setting.arrays.length ? "Obstacle" : "Solid", true, choice("obstacle", ["opaque", "transparent", "hidden"], look.obstacle, (value) => { look.obstacle = value; again(); }),
+  const others = setting.solids.length > 1 ? choice("solid", [...setting.solids].sort(), setting.solids[0], (name) => viewer.send({ do: "solid", name })) : null;
+  groups.push(group(setting.arrays.length ? "Obstacle" : "Solid", true, others ? row("which", others) : "", choice("obstacle", ["opaque", "transparent", "hidden"], look.obstacle, (value) => { look.obstacle = value; again(); }),
     ...(setting.live ? [row("surface", choice("surface", ["automatic", "exact", "mesh"], look.surface, (value) => { look.surface = value; again(); })), element("p", { className: "note", id: "surface-said" })] : [])));
+  if (setting.has_surface)
+    groups.push(group("Surface of the fluid", true, choice("water", ["opaque", "transparent", "hidden"], look.water, (value) => { look.water = value; again(); })));
   groups.push(cutGroup(viewer));
   if (setting.live) groups.push(sliceGroup(viewer));
   if (setting.arrays.length) groups.push(motionGroup(viewer));
@@ -47,7 +50,7 @@ function buildPanel(place, viewer) {
     row("", check("box-shown", "box and lengths", look.box, (value) => { look.box = value; again(); })),
     element("div", { className: "buttons" }, element("button", { id: "copy-camera", title: "copy the camera as a key of the scene", onclick: () => viewer.copyCamera() }, "Copy as scene key"))));
   if (setting.arrays.length)
-    groups.push(group("Particles", false,
+    groups.push(group("Particles", setting.has_surface,
       row("", check("particles-shown", "shown", look.particles, (value) => { look.particles = value; again(); })),
       row("size", slider("size", [0.2, 2, look.radius / setting.radius], (value) => { look.radius = value * setting.radius; again(); })),
       setting.live ? null : row("", check("blend", "blended between frames", look.blend, (value) => { look.blend = value; again(); }))));

@@ -99,7 +99,12 @@ class Plots {
       context.strokeStyle = LINE_COLOURS[k % LINE_COLOURS.length];
       context.lineWidth = 1.3;
       // where a value is missing, the line has a gap
-      for (const piece of pieces(plot.times, column.values)) line(context, piece.map(([t, v]) => [x(t), y(v)]));
+      for (const piece of pieces(plot.times, column.values)) {
+        line(context, piece.map(([t, v]) => [x(t), y(v)]));
+        if (piece.length !== 1) continue;
+        context.fillStyle = context.strokeStyle;
+        context.fillRect(x(piece[0][0]) - 2, y(piece[0][1]) - 2, 4, 4);
+      }
     });
     const at = (pixel) => clamp(first + ((pixel - left) / (right - left)) * (last - first), first, last);
     Object.assign(plot, { still, colours, ratio, lines, legend, x, at, top, bottom, first, last });

@@ -14,17 +14,18 @@ class Scene {
   }
 
   prepare() {
-    const gl = this.canvas.getContext("webgl2", { alpha: false, antialias: true, powerPreference: "high-performance" });
+    const gl = this.canvas.getContext("webgl2", { alpha: false, antialias: true, stencil: true, powerPreference: "high-performance" });
     if (!gl) throw new Error("this browser has no WebGL 2, which the picture needs");
     this.gl = gl;
     this.points = this.program(POINTS_VERTEX, POINTS_FRAGMENT);
     this.mesh = this.program(MESH_VERTEX, MESH_FRAGMENT);
     this.lines = this.program(LINES_VERTEX, LINES_FRAGMENT);
     this.map = gl.createTexture();
-    this.buffers = Object.fromEntries(["from", "to", "level", "edges", "velocity0", "velocity1", "velocity2"].map((name) => [name, gl.createBuffer()]));
+    this.buffers = Object.fromEntries(["from", "to", "level", "edges", "section", "velocity0", "velocity1", "velocity2"].map((name) => [name, gl.createBuffer()]));
     this.pointsArray = gl.createVertexArray();
     this.edgesArray = gl.createVertexArray();
-    this.solid = null;
+    this.sectionArray = gl.createVertexArray();
+    this.parts = { solid: null, water: null };
     this.shown = {};
     this.edges = 0;
     this.slice = new SliceView(this);
@@ -80,15 +81,23 @@ class Scene {
       gl.texParameteri(gl.TEXTURE_2D, key, value);
   }
 
-  /** Gives the mesh that is shown; nothing is done if it is shown already. */
-  setMesh(mesh) {
-    if (this.shown.mesh === mesh) return;
-    this.shown.mesh = mesh;
+  get solid() {
+    return this.parts.solid;
+  }
+
+  /** Gives the mesh that is shown as the solids or as the water, and where its parts are; `null`: where they were. */
+  setMesh(name, mesh, poses = null) {
+    if (this.shown[name] !== mesh) this.fillMesh(name, mesh);
+    if (this.parts[name]) this.parts[name].poses = poses;
+  }
+
+  fillMesh(name, mesh) {
+    this.shown[name] = mesh;
     const gl = this.gl;
-    if (this.solid) {
-      gl.deleteVertexArray(this.solid.array);
-      this.solid.buffers.forEach((buffer) => gl.deleteBuffer(buffer));
-      this.solid = null;
+    if (this.parts[name]) {
+      gl.deleteVertexArray(this.parts[name].array);
+      this.parts[name].buffers.forEach((buffer) => gl.deleteBuffer(buffer));
+      this.parts[name] = null;
     }
     if (!mesh || mesh.corners.length === 0) return;
     const array = gl.createVertexArray();
@@ -105,7 +114,7 @@ class Scene {
     gl.bindBuffer(gl.ELEMENT_ARRAY_BUFFER, corners);
     gl.bufferData(gl.ELEMENT_ARRAY_BUFFER, mesh.corners, gl.STATIC_DRAW);
     gl.bindVertexArray(null);
-    this.solid = { array, buffers: [...buffers, corners], count: mesh.corners.length };
+    this.parts[name] = { array, buffers: [...buffers, corners], triangles: mesh.parts, poses: null };
   }
 
   fill(name, owner, data) {
@@ -126,20 +135,22 @@ class Scene {
     const [width, height] = [this.canvas.width, this.canvas.height];
     gl.viewport(0, 0, width, height);
     gl.clearColor(...look.colours.back, 1);
-    gl.clear(gl.COLOR_BUFFER_BIT | gl.DEPTH_BUFFER_BIT);
+    gl.clear(gl.COLOR_BUFFER_BIT | gl.DEPTH_BUFFER_BIT | gl.STENCIL_BUFFER_BIT);
     gl.enable(gl.DEPTH_TEST);
     gl.depthMask(true);
     gl.disable(gl.BLEND);
     if (look.obstacle === "opaque") this.exact.measure(look, view, projection, look.time, look.values);
     if (this.exact.isShown(look)) this.exact.draw(look, view, projection, look.time, look.values);
-    else if (this.solid && look.obstacle === "opaque") this.drawMesh(look, view, projection, 1);
+    else if (this.solid && look.obstacle === "opaque") this.drawMesh("solid", look, view, projection, 1);
+    if (this.parts.water && look.water === "opaque") this.drawMesh("water", look, view, projection, 1);
     const fluid = frames?.from.count > 0;
-    if (fluid && look.particles) this.drawPoints(look, view, projection, frames);
+    if (fluid && (look.particles || look.lacksSurface)) this.drawPoints(look, view, projection, frames);
     if (fluid && look.arrows && look.velocity) this.motion.drawArrows(look, view, projection, frames);
     this.drawLines(look, view, projection);
     if (fluid && look.trails) this.motion.drawTrails(look, view, projection, timeline.frames, look.blended ? timeline.place : Math.floor(timeline.place + 1e-9));
     if (look.slice) this.slice.draw(look.slice, view, projection);
-    if (this.solid && look.obstacle === "transparent") this.drawMesh(look, view, projection, 0.3);
+    if (this.parts.water && look.water === "transparent") this.drawMesh("water", look, view, projection, 0.45);
+    if (this.solid && look.obstacle === "transparent") this.drawMesh("solid", look, view, projection, 0.3);
   }
 
   drawLines(look, view, projection) {
@@ -152,20 +163,33 @@ class Scene {
     if (look.box) gl.drawArrays(gl.LINES, 0, this.edges);
   }
 
-  drawMesh(look, view, projection, opacity) {
+  drawMesh(name, look, view, projection, opacity) {
     const gl = this.gl;
     const { mesh } = this;
+    const part = this.parts[name];
+    const isWater = name === "water";
     gl.useProgram(mesh.program);
     mesh.set("Matrix4fv", "view", false, view);
     mesh.set("Matrix4fv", "projection", false, projection);
-    mesh.set("3f", "base", ...look.colours.solid);
-    mesh.set("3f", "section", ...look.colours.section);
+    mesh.set("3f", "base", ...(isWater ? look.colours.water : look.colours.solid));
+    mesh.set("3f", "section", ...(isWater ? look.colours.depth : look.colours.section));
     mesh.set("1f", "opacity", opacity);
     mesh.set("1f", "parallel", look.parallel ? 1 : 0);
-    mesh.set("4f", "cut", ...(look.cutSolid ? look.cut : NO_CUT));
-    gl.bindVertexArray(this.solid.array);
-    const draw = () => gl.drawElements(gl.TRIANGLES, this.solid.count, gl.UNSIGNED_INT, 0);
-    if (opacity === 1) return draw();
+    mesh.set("4f", "cut", ...((isWater ? look.cutFluid : look.cutSolid) ? look.cut : NO_CUT));
+    gl.bindVertexArray(part.array);
+    const draw = () => {
+      let first = 0;
+      part.triangles.forEach((triangles, k) => {
+        mesh.set("Matrix4fv", "pose", false, poseMatrix(part.poses?.[k]));
+        gl.drawElements(gl.TRIANGLES, 3 * triangles, gl.UNSIGNED_INT, 12 * first);
+        first += triangles;
+      });
+    };
+    if (opacity === 1) {
+      draw();
+      if ((isWater ? look.cutFluid : look.cutSolid) && look.cut !== NO_CUT) this.drawSection(draw, look, view, projection, isWater ? look.colours.depth : look.colours.section);
+      return;
+    }
     gl.enable(gl.BLEND);
     gl.blendFunc(gl.ONE, gl.ONE_MINUS_SRC_ALPHA);
     gl.depthMask(false);
@@ -177,6 +201,46 @@ class Scene {
     gl.disable(gl.CULL_FACE);
     gl.depthMask(true);
     gl.disable(gl.BLEND);
+  }
+
+  /** Closes a mesh that is cut open with its section: where its inner sides prevail, the plane lies within it. */
+  drawSection(draw, look, view, projection, colour) {
+    const gl = this.gl;
+    gl.colorMask(false, false, false, false);
+    gl.depthMask(false);
+    gl.disable(gl.DEPTH_TEST);
+    gl.enable(gl.STENCIL_TEST);
+    gl.stencilFunc(gl.ALWAYS, 0, 255);
+    gl.stencilOpSeparate(gl.FRONT, gl.KEEP, gl.KEEP, gl.DECR_WRAP);
+    gl.stencilOpSeparate(gl.BACK, gl.KEEP, gl.KEEP, gl.INCR_WRAP);
+    draw();
+    gl.colorMask(true, true, true, true);
+    gl.depthMask(true);
+    gl.enable(gl.DEPTH_TEST);
+    gl.stencilFunc(gl.NOTEQUAL, 0, 255);
+    gl.stencilOp(gl.KEEP, gl.KEEP, gl.KEEP);
+    const [nx, ny, nz, offset] = look.cut;
+    const axis = [nx, ny, nz].findIndex((n) => n !== 0);
+    const [u, v] = [(axis + 1) % 3, (axis + 2) % 3];
+    const { min, max } = look.boxBounds;
+    const room = norm(sub(max, min));
+    const corners = [[-1, -1], [1, -1], [-1, 1], [1, 1]].flatMap(([a, b]) => {
+      const corner = scale(add(min, max), 0.5).map((x, k) => x + room * (k === u ? a : k === v ? b : 0));
+      corner[axis] = offset / look.cut[axis];
+      return corner;
+    });
+    gl.bindVertexArray(this.sectionArray);
+    gl.bindBuffer(gl.ARRAY_BUFFER, this.buffers.section);
+    gl.bufferData(gl.ARRAY_BUFFER, new Float32Array(corners), gl.DYNAMIC_DRAW);
+    gl.enableVertexAttribArray(0);
+    gl.vertexAttribPointer(0, 3, gl.FLOAT, false, 0, 0);
+    gl.useProgram(this.lines.program);
+    this.lines.set("Matrix4fv", "view", false, view);
+    this.lines.set("Matrix4fv", "projection", false, projection);
+    this.lines.set("4f", "paint", ...colour, 1);
+    gl.drawArrays(gl.TRIANGLE_STRIP, 0, 4);
+    gl.disable(gl.STENCIL_TEST);
+    gl.clear(gl.STENCIL_BUFFER_BIT);
   }
 
   drawPoints(look, view, projection, { from, to, part }) {
@@ -206,9 +270,9 @@ class Scene {
     points.set("1f", "part", next === from ? 0 : part);
     points.set("1f", "radius", look.radius);
     points.set("1f", "height", this.canvas.height);
-    // balls that stand out of a plane would hide what is drawn in it
+    // balls that stand out of a plane would hide what is seen in it
     const [nx, ny, nz, offset] = look.cutFluid ? look.cut : NO_CUT;
-    points.set("4f", "cut", nx, ny, nz, look.slice ? offset - 1.1 * look.radius : offset);
+    points.set("4f", "cut", nx, ny, nz, look.slice || (look.cutSolid && this.solid && look.obstacle === "opaque") ? offset - 1.1 * look.radius : offset);
     points.set("2f", "tone", ...toneOf(from.ranges[look.array], look.range));
     gl.activeTexture(gl.TEXTURE0);
     gl.bindTexture(gl.TEXTURE_2D, this.map);
@@ -217,6 +281,10 @@ class Scene {
     gl.drawArrays(gl.POINTS, 0, this.drawn);
   }
 }
+
+/** A pose, the columns of a rotation and a translation, as a matrix. */
+const poseMatrix = (pose) =>
+  pose ? [0, 1, 2, 3].flatMap((k) => [...pose.slice(3 * k, 3 * k + 3), k === 3 ? 1 : 0]) : [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1];
 
 /** A plane that leaves nothing out. */
 const NO_CUT = [0, 0, 0, 1];

@@ -46,13 +46,14 @@ const MESH_VERTEX = `#version 300 es
 precision highp float;
 layout(location = 0) in vec3 position;
 layout(location = 1) in vec3 direction;
-uniform mat4 view, projection;
+uniform mat4 view, projection, pose;
 out vec3 normal, seen, place;
 void main() {
-  vec4 p = view * vec4(position, 1.0);
-  place = position;
+  vec4 now = pose * vec4(position, 1.0);
+  vec4 p = view * now;
+  place = now.xyz;
   seen = p.xyz;
-  normal = mat3(view) * direction;
+  normal = mat3(view) * mat3(pose) * direction;
   gl_Position = projection * p;
 }`;
 

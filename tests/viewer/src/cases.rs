@@ -33,6 +33,7 @@ pub const ALL: &[(&str, Case)] = &[
     ("pictures and videos are saved", files),
     ("a page of a mesh", mesh),
     ("a page of moving obstacles and probes", moving),
+    ("the surface of the fluid, and what is carried along, cut open", surface),
     ("plots of energy, audit and probes follow a run and stand in its page", plots),
     ("a slice of ω, cut open there, follows its slider and the obstacle", slice),
     ("arrows and trails show where the fluid goes", motion),
@@ -51,6 +52,7 @@ pub const ALL: &[(&str, Case)] = &[
     ("a mistake in the file is shown and mended", live::mended),
     ("a solid without a scene", live::solid),
     ("a solid that moves without a scene", live::moving_solid),
+    ("what moves as one is carried along, and one of several solids is chosen", live::carried),
 ];
 
 impl Room {
@@ -234,6 +236,47 @@ fn moving(room: &mut Room) {
     assert!(Picture::of(&room.scene()).difference(&first) > 0.2);
     // the energy, the audit in per cent and its speed, and the height of the scene's probe
     assert_eq!(room.browser.number("document.querySelectorAll('#plots canvas').length"), 4.0);
+}
+
+/// A blade that turns within the water, with the surface of the fluid: its mesh is there once, and sections are closed.
+fn surface(room: &mut Room) {
+    let text = "rfm 1\nsolid blade = box([-0.2, -0.05, 0.1], [0.2, 0.05, 0.3]).rotate_z(3*t)\nscene stirred {\n  \
+                box { min: [-0.3, -0.3, 0], max: [0.3, 0.3, 0.6] }\n  obstacle { solid: blade }\n  \
+                fluid { shape: box([-0.3, -0.3, 0], [0.3, 0.3, 0.35]), particles: 1500 }\n  \
+                run { until: 0.2 s, save_every: 0.1 s }\n}\n";
+    std::fs::write(room.folder.join("stirred.rfm"), text).unwrap();
+    rfm(&room.folder, &["run", "stirred.rfm", "--no-pictures"]);
+    rfm(&room.folder, &["mesh", "stirred.out", "--fluid"]);
+    rfm(&room.folder, &["view", "stirred.out", "--save", "stirred.html"]);
+    room.browser.open(&format!("file://{}", room.folder.join("stirred.html").display()));
+    room.browser.wait_for("window.viewer && viewer.timeline.playing");
+    room.browser.eval("viewer.play(false)");
+    room.place(2.0);
+    assert_eq!(
+        room.browser.eval("[viewer.meshes.length, viewer.surfaces.length, viewer.look.particles].join()"),
+        "1,3,false"
+    );
+    room.shot("surface");
+    room.browser.choose("#cut-axis", "y");
+    room.browser.choose("#water", "opaque");
+    let blue = |picture: &Picture| picture.part(|[r, _, b]| b > r.saturating_add(40));
+    let orange = |picture: &Picture| picture.part(|[r, _, b]| r > b.saturating_add(40));
+    let cut = Picture::of(&room.scene());
+    room.shot("surface-cut");
+    assert!(blue(&cut) > 0.02 && orange(&cut) > 0.003, "{} {}", blue(&cut), orange(&cut));
+    // particles behind the plane do not stand out of the section of the blade
+    room.browser.choose("#water", "hidden");
+    let alone = Picture::of(&room.scene());
+    room.browser.click("#particles-shown");
+    let among = Picture::of(&room.scene());
+    room.shot("surface-particles");
+    assert!(orange(&alone) - orange(&among) < 0.05 * orange(&alone), "{} {}", orange(&alone), orange(&among));
+    // it is where the frame says
+    room.browser.choose("#cut-axis", "none");
+    room.browser.click("#particles-shown");
+    let late = Picture::of(&room.scene());
+    room.place(0.0);
+    assert!(Picture::of(&room.scene()).difference(&late) > 0.2);
 }
 
 /// What stands in plots is within them, and they are within the window.

@@ -82,7 +82,7 @@ pub fn beside_the_mesh(room: &mut Room) {
 
     // a slider moves it without a mesh, and both are the same once it is let go
     room.browser.choose("#surface", "exact");
-    let (mesh, run) = ("viewer.scene.shown.mesh", room.browser.number("viewer.run.number"));
+    let (mesh, run) = ("viewer.scene.shown.solid", room.browser.number("viewer.run.number"));
     room.browser.eval(&format!("(viewer.old = {mesh}, 0)"));
     let mut times = Vec::new();
     let slide = |room: &mut Room, event: &str, value: f64| {
@@ -149,8 +149,8 @@ pub fn thin(room: &mut Room) {
     room.browser.eval("(viewer.camera.look([0, 0, 1]), 0)");
     assert!(silhouette(&surface(room, "exact")).iter().filter(|seen| **seen).count() > 300);
     // the number of wires has no uniform: the mesh is shown until the file is read again
-    room.browser.eval("(viewer.old = viewer.scene.shown.mesh, document.getElementById('param-n').value = 5, document.getElementById('param-n').dispatchEvent(new Event('input')))");
-    room.browser.wait_for("viewer.scene.shown.mesh !== viewer.old");
+    room.browser.eval("(viewer.old = viewer.scene.shown.solid, document.getElementById('param-n').value = 5, document.getElementById('param-n').dispatchEvent(new Event('input')))");
+    room.browser.wait_for("viewer.scene.shown.solid !== viewer.old");
     let said = room.browser.eval("document.getElementById('surface-said').textContent");
     assert_eq!(said, "mesh");
 

@@ -40,11 +40,11 @@ pub fn slider(room: &mut Room) {
     for k in 0..9 {
         let began = Instant::now();
         room.browser.eval(&format!(
-            "(() => {{ viewer.old = viewer.scene.shown.mesh; const track = document.getElementById('param-cx'); track.value = {}; \
+            "(() => {{ viewer.old = viewer.scene.shown.solid; const track = document.getElementById('param-cx'); track.value = {}; \
              track.dispatchEvent(new Event('input')); }})()",
             1.0 + 0.1 * f64::from(k)
         ));
-        room.browser.wait_for("viewer.scene.shown.mesh !== viewer.old");
+        room.browser.wait_for("viewer.scene.shown.solid !== viewer.old");
         times.push(began.elapsed().as_secs_f64() * 1e3);
     }
     times.sort_by(f64::total_cmp);
@@ -126,15 +126,15 @@ pub fn solid(room: &mut Room) {
     assert!(off < 1e-3, "the hoop is in the middle of the picture, {off}");
     assert_eq!(room.browser.eval("document.querySelector('#value-r').value"), "5");
     room.browser.choose("#surface", "mesh");
-    room.browser.eval("viewer.old = viewer.scene.shown.mesh");
+    room.browser.eval("viewer.old = viewer.scene.shown.solid");
     room.browser.eval("(() => { const track = document.getElementById('param-r'); track.value = 0.1; track.dispatchEvent(new Event('input')); })()");
-    room.browser.wait_for("viewer.scene.shown.mesh !== viewer.old");
+    room.browser.wait_for("viewer.scene.shown.solid !== viewer.old");
 }
 
 pub fn moving_solid(room: &mut Room) {
     let viewer = Viewer::start(&room.folder, &["paddle.rfm", "-s", "stirrer"]);
     room.browser.open(&viewer.address);
-    // it moves by itself, and keeps a mesh of each instant as far as there is time for it
+    // it moves by itself, and keeps a mesh of each instant as far as there is time for it: blades turn about a shaft at rest
     room.browser.wait_for("window.viewer && viewer.run.playing && viewer.timeline.frames.length > 10");
     assert_eq!(room.browser.eval("document.getElementById('transport').hidden"), false);
     assert_eq!(room.browser.number("viewer.setting.arrays.length"), 0.0);
@@ -183,4 +183,38 @@ pub fn moving_solid(room: &mut Room) {
     room.browser.wait_for(
         "viewer.setting.arrays.length > 0 && viewer.timeline.frames.length > 0 && viewer.scene.drawn > 0",
     );
+}
+
+/// What moves as one is meshed once, and frames say where it is.
+pub fn carried(room: &mut Room) {
+    let file = room.folder.join("vane.rfm");
+    let vane = "rfm 1\nsolid vane = box([-0.3, -0.05, 0], [0.3, 0.05, 0.4]).rotate_z(2*t)\nsolid hub = sphere(0.2)\n";
+    std::fs::write(&file, vane).unwrap();
+    let viewer = Viewer::start(&room.folder, &["vane.rfm", "-s", "vane"]);
+    room.browser.open(&viewer.address);
+    room.browser.wait_for("window.viewer && viewer.carried && viewer.timeline.frames.length > 10");
+    room.browser.choose("#surface", "mesh");
+    room.browser.click("#play");
+    room.browser.wait_for("!viewer.run.playing");
+    let angles = "Math.max(...viewer.timeline.frames.map(({ time, poses: [pose] }) => Math.abs(pose[1] - Math.sin(2 * time))))";
+    assert!(room.browser.number(angles) < 1e-9);
+    // earlier instants show it where it was
+    room.browser.eval("(viewer.timeline.place = 3, viewer.timelineChanged(), viewer.draw())");
+    let shown =
+        "JSON.stringify(viewer.scene.parts.solid.poses) === JSON.stringify(viewer.timeline.frames[3].poses)";
+    assert_eq!(room.browser.eval(shown), true);
+    assert_eq!(room.browser.eval("viewer.scene.shown.solid === viewer.carried"), true);
+
+    // of several solids one is chosen in the page
+    let viewer = Viewer::start(&room.folder, &["vane.rfm"]);
+    room.browser.open(&viewer.address);
+    room.browser.wait_for("window.viewer && viewer.meshes.length === 1");
+    assert_eq!(room.browser.eval("viewer.setting.solids.join()"), "hub,vane");
+    room.browser.choose("#solid", "vane");
+    room.browser.wait_for("viewer.setting.solids.join() === 'vane,hub' && viewer.carried");
+    // a file that is gone is told of, and read when it is back
+    std::fs::remove_file(&file).unwrap();
+    room.browser.wait_for("document.getElementById('notice').textContent.includes('not there any more')");
+    std::fs::write(&file, vane).unwrap();
+    room.browser.wait_for("document.getElementById('notice').hidden");
 }

@@ -117,10 +117,12 @@ fn page_of_simulation(experiment: &Experiment, simulation: &Simulation, facts: &
         facts: facts.to_string(),
         live: false,
         moves: false,
+        has_surface: false,
         domain: Corners::from(&domain),
         lattice: Some(Corners::from(lattice.bounds())),
         radius: 0.5 * experiment.parameters().spacing(),
         arrays: ["speed", "density", "pressure"].into_iter().chain(VELOCITY).map(array).collect(),
+        solids: Vec::new(),
         gravity: None,
         params: Vec::new(),
         plots: None,
@@ -129,11 +131,11 @@ fn page_of_simulation(experiment: &Experiment, simulation: &Simulation, facts: &
     let mut page = Page::begin(&mut out, &setting).ok()?;
     let has_mesh = !obstacles.triangles.is_empty();
     if has_mesh {
-        page.block(&pack_mesh(&split_creases(&obstacles), simulation.time(), 0)).ok()?;
+        page.mesh(&pack_mesh(&split_creases(&obstacles), simulation.time(), 0)).ok()?;
     }
     let (time, step) = (simulation.time(), Some(simulation.steps()));
-    let head = FrameHead { time, step, ranges, mesh: has_mesh.then_some(0), run: 0, motion: None };
-    page.block(&pack_frame(&head, &frame, None)).ok()?;
+    let head = FrameHead { time, step, ranges, mesh: has_mesh.then_some(0), ..FrameHead::at(time) };
+    page.frame(&pack_frame(&head, &frame, None)).ok()?;
     page.end().ok()?;
     String::from_utf8(out).ok()
 }
