@@ -448,11 +448,18 @@ fn runs_are_the_same_for_any_number_of_threads() {
         "history",
         "obstacle.stl",
         "obstacle.vtp",
+        "open_in_paraview.py",
         "particles.pvd",
         "pictures",
         "summary.json",
     ];
     assert_eq!(files(&folder.path().join("out1")), expected);
+    // the script for ParaView knows the scene, and no place in it is left open
+    let script = std::fs::read_to_string(folder.path().join("out1/open_in_paraview.py")).unwrap();
+    for line in ["RADIUS = 0.", "FASTEST = ", "LOW, HIGH = [", "FOLDER = \"/"] {
+        let found = script.lines().find(|written| written.starts_with(line));
+        assert!(found.is_some_and(|written| !written.contains('{')), "{line}: {found:?}");
+    }
 }
 
 #[test]

@@ -131,3 +131,36 @@ impl Bodies {
         grid.map_err(|error| no_grid(&error, "--mesh-cells", self.cells))
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use glam::DVec3;
+    use rfm::{Engine, Program};
+
+    use super::*;
+
+    /// A block that sinks through the floor of the box and comes back, and turns.
+    #[test]
+    fn a_body_takes_its_mesh_along_while_it_is_whole_within_the_box() {
+        let text = "rfm 1\nsolid block = box([-0.2, -0.1, -0.1], [0.2, 0.1, 0.1]).rotate_z(t).move([0, 0, 0.6*cos(t)])\n";
+        let program = Program::from_source("block.rfm", text).unwrap();
+        let solid = program.solid_with("block", Engine::Interpreter).unwrap();
+        let domain = Aabb::new(DVec3::new(-1.0, -1.0, 0.0), DVec3::ONE);
+        let bodies = Bodies::of(vec![solid.clone()], domain, 16);
+        let mesh_at = |time: f64| bodies.meshes_at(time).unwrap().remove(0);
+        let start = mesh_at(0.0);
+        for time in [0.3, 1.2, 5.2, 6.0] {
+            let mesh = mesh_at(time);
+            assert_eq!(mesh.triangles, start.triangles, "{time}");
+            assert!(bodies.placements(time).is_some());
+            let now = solid.at(time);
+            let off = mesh.positions.iter().map(|p| now.omega(*p).abs()).fold(0.0, f64::max);
+            assert!(off < 1e-9, "{time}: {off}");
+        }
+        // cut off at the floor
+        for time in [1.5, 4.8] {
+            assert!(bodies.placements(time).is_none(), "{time}");
+            assert!(mesh_at(time).positions.iter().all(|p| p.z >= -2e-3), "{time}");
+        }
+    }
+}

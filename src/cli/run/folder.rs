@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 use super::super::args::Run;
 use super::super::output::{Shown, TEMPORARY, counted};
 use super::super::{Failure, note};
-use super::checkpoints;
+use super::{checkpoints, paraview};
 use crate::cli::saved::{HISTORY, OWN_TABLES};
 use crate::cli::surfaces;
 use rfm::lower::Scene;
@@ -23,11 +23,11 @@ const PARTS: [&str; 5] = ["frames", "pictures", "checkpoints", PROBES, HISTORY];
 pub(super) const PROBES: &str = "probes";
 
 /// Files that a run writes beside these folders.
-pub(super) const RESULTS: [&str; 5] =
-    ["summary.json", "particles.pvd", "obstacle.pvd", "obstacle.stl", "obstacle.vtp"];
+pub(super) const RESULTS: [&str; 6] =
+    ["summary.json", "particles.pvd", "obstacle.pvd", "obstacle.stl", "obstacle.vtp", paraview::NAME];
 
 /// Beginnings of the names of files that a run writes beside these folders.
-const FILES: [&str; 3] = ["summary", "particles", "obstacle"];
+const FILES: [&str; 4] = ["summary", "particles", "obstacle", "open_in_paraview"];
 
 /// The right to write into a folder, until it is dropped. The file with the lock stays: if it were removed, another run
 /// could hold the lock of the removed file while a third locks a new one.

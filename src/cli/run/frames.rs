@@ -11,7 +11,7 @@ use super::super::stopwatch::Stopwatch;
 use super::super::{Failure, output};
 use super::bodies::Bodies;
 use super::pictures::{Look, Pictures};
-use super::{checkpoints, folder, probes};
+use super::{checkpoints, folder, paraview, probes};
 use crate::cli::output::{Shown, counted};
 use crate::cli::surfaces;
 use rfm::Experiment;
@@ -69,6 +69,7 @@ impl Frames {
         }
         if write_frames {
             create(&folder.join("frames"))?;
+            paraview::write(&folder, experiment)?;
         }
         if pictures.is_some() {
             create(&folder.join("pictures"))?;
@@ -162,7 +163,7 @@ impl Frames {
         let mut parts = vec!["summary.json".to_string()];
         if self.write_frames {
             let frames = counted(self.listed().count(), "frame");
-            parts.push(format!("particles.pvd and {frames} for ParaView"));
+            parts.push(format!("particles.pvd, open_in_paraview.py and {frames} for ParaView"));
         }
         if self.write_frames && !self.bodies.is_empty() {
             let moving = if self.bodies.move_about() { "obstacle.pvd, " } else { "" };

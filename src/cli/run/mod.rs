@@ -11,6 +11,7 @@ mod forecast;
 mod frames;
 mod goal;
 mod means;
+mod paraview;
 pub(super) mod pictures;
 mod probe_plot;
 mod probes;
