@@ -70,7 +70,7 @@ impl Bodies {
     /// The mesh of each solid at a time, s, cut off at the box.
     pub fn meshes_at(&self, time: f64) -> Result<Vec<Mesh>, Failure> {
         let mesh_at = |(number, solid): (usize, &Solid)| {
-            // the mesh of what stands still is asked for once, and not kept
+            // the mesh of what stands still is not kept
             let carried = || Some((self.placement(number, time)?, self.at_start(number)?));
             match if solid.moves() { carried() } else { None } {
                 Some((placement, mesh)) => Ok(mesh.moved(&placement)),
