@@ -34,6 +34,7 @@ mod op;
 pub mod r0;
 mod real;
 
+pub(crate) use bounds::choice::{Choice, choosing_numbers};
 pub use bounds::error::{Arithmetic, Error, ErrorAnalysis, Inputs};
 pub use bounds::float::FloatType;
 pub use bounds::magnitude::Magnitudes;
@@ -46,6 +47,7 @@ pub(crate) use contraction::{
     reach,
 };
 pub(crate) use derived::contact::{contact, wall_velocity};
+pub(crate) use derived::forward::forward_gradient;
 pub use derived::gradient::gradient;
 pub use derived::gradient::gradient_and_rate;
 pub(crate) use derived::hoisted::{Hoisted, Outside, Uniforms, hoisted};

@@ -2,13 +2,15 @@
 //!
 //! Only graphs are taken whose every node is finite over [`REACH`], and so small that no square overflows.
 
+use std::collections::HashMap;
+
 use glam::DVec3;
 
 use super::functions::RangeFunction;
 use crate::geom::Aabb;
 use crate::ir::{
-    Affine, Axis, Binary, BinaryFunction, Expr, Graph, Limits, Node, RangeEvaluator, RangeRule, Region,
-    Unary, UnaryFunction,
+    Affine, Axis, Binary, BinaryFunction, Choice, Expr, Graph, Limits, Node, RangeEvaluator, RangeRule,
+    Region, Unary, UnaryFunction,
 };
 
 /// Boxes within this distance of the origin are answered by machine code.
@@ -58,6 +60,11 @@ pub(super) enum Instruction {
     Quotient(Node, Node),
     /// The share of the first in the smaller of both: a derivative.
     Share(Node, Node),
+    /// One of two values: the first where a share is 1, the second where it is 0, and anything between them otherwise.
+    Choice {
+        values: [Node; 2],
+        share: Node,
+    },
     /// A called function. One with a single operand has it twice.
     Call(RangeFunction, [Node; 2]),
 }
@@ -97,11 +104,24 @@ pub(in crate::codegen) struct Instructions(pub(super) Vec<Instruction>);
 impl Instructions {
     /// `None` if the graph has an operation that range programs do not have.
     pub fn of(graph: &Graph) -> Option<Self> {
-        graph.nodes().map(|(_, expr)| Instruction::of(graph, expr)).collect::<Option<_>>().map(Self)
+        let choices: HashMap<Node, Choice> = Choice::all(graph).into_iter().map(|c| (c.node(), c)).collect();
+        let instruction = |(node, expr)| {
+            let choice = choices.get(&node).and_then(|choice| Instruction::choice(graph, choice));
+            choice.or_else(|| Instruction::of(graph, expr))
+        };
+        graph.nodes().map(instruction).collect::<Option<_>>().map(Self)
     }
 }
 
 impl Instruction {
+    /// `None` if its share may be anything, as far as the graph says.
+    fn choice(graph: &Graph, choice: &Choice) -> Option<Self> {
+        let (share, one) = choice.share();
+        let is_share = matches!(graph.expr(share), Expr::Binary(Binary::MinWeight | Binary::MaxWeight, ..));
+        (is_share && graph.as_constant(one) == Some(1.0))
+            .then(|| Self::Choice { values: choice.values(), share })
+    }
+
     fn of(graph: &Graph, expr: Expr) -> Option<Self> {
         Some(match RangeRule::of(graph, expr) {
             RangeRule::Square(a) => Self::Square(a),

@@ -102,14 +102,15 @@ pub(super) fn emit(
             Instruction::Share(a, b) => ranges.share(ranges.values[&a], ranges.values[&b]),
             Instruction::Divide(a, number) => ranges.divide(ranges.values[&a], ranges.numbers[&number]),
             Instruction::Quotient(a, b) => ranges.quotient(ranges.values[&a], ranges.values[&b]),
+            Instruction::Choice { values: [a, b], share } => {
+                ranges.choice([ranges.values[&a], ranges.values[&b]], ranges.values[&share])
+            }
             Instruction::Call(function, operands) => {
                 ranges.call(function, operands.map(|node| ranges.values[&node]))
             }
         };
-        match &function {
-            Some(cone) if cone.contains(&node) => ranges.forbid_jumps(instruction, value),
-            Some(_) => ranges.forbid_open_choices(instruction, value),
-            None => {}
+        if function.as_ref().is_some_and(|cone| cone.contains(&node)) {
+            ranges.forbid_jumps(instruction, value);
         }
         ranges.values.insert(node, value);
     }

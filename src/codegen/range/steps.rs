@@ -67,13 +67,16 @@ impl Ranges<'_, '_> {
         self.emitter.compare(FloatCC::NotEqual, width, zero)
     }
 
-    /// Sees to it that there is no answer where a derivative may be that of either operand of a minimum. Where both have
-    /// nearly the same, their weights, each from 0 to 1, would give anything from nothing to their sum.
-    pub(super) fn forbid_open_choices(&mut self, instruction: Instruction, value: Value) {
-        if let Instruction::Share(..) = instruction {
-            let is_open = self.varies(value);
-            self.fail_where(is_open);
-        }
+    /// One value where its share is 1 or 0, the hull of both otherwise.
+    pub(super) fn choice(&mut self, [a, b]: [Value; 2], share: Value) -> Value {
+        let [least, most] = [BoundLane::Low, BoundLane::High].map(|lane| self.both(share, lane));
+        let (zero, minus_one) = (self.emitter.constant(0.0), self.emitter.constant(-1.0));
+        let is_first = self.emitter.compare(FloatCC::LessThanOrEqual, least, minus_one);
+        let is_second = self.emitter.compare(FloatCC::LessThanOrEqual, most, zero);
+        // both lanes hold what grows with the range
+        let hull = self.emitter.max(a, b);
+        let other = self.emitter.select(is_second, b, hull);
+        self.emitter.select(is_first, a, other)
     }
 
     /// Sees to it that there is no answer where a node may jump.
@@ -126,7 +129,9 @@ impl Ranges<'_, '_> {
             | Instruction::Slab { .. }
             | Instruction::Divide(..)
             | Instruction::Quotient(..)
-            | Instruction::Call(..) => {}
+            | Instruction::Call(..)
+            // its share is forbidden to be open
+            | Instruction::Choice { .. } => {}
         }
     }
 

@@ -1,13 +1,13 @@
-//! One of two values, by a number that is 0 or 1: what `where` is made of.
+//! One of two values, by a number from 0 to 1: what `where` is made of, and the derivative of a minimum.
 
 use crate::interval::Interval;
 use crate::ir::graph::{Expr, Graph, Node};
 use crate::ir::op::{Binary, Unary};
 
-/// a·c + b·(1 − c), where c is a whole number. Taken as a sum of products, its range would reach to zero wherever c may
-/// be 0 or 1.
+/// a·c + b·(1 − c), where c is a whole number or a share. Taken as a sum of products, its range would reach to zero
+/// wherever c may be 0 or 1.
 #[derive(Debug, Clone, Copy)]
-pub(in crate::ir) struct Choice {
+pub(crate) struct Choice {
     sum: Node,
     values: [Node; 2],
     /// c
@@ -31,8 +31,11 @@ impl Choice {
         let Expr::Binary(Binary::MulOrZero, a, counts) = graph.expr(first) else { return None };
         let Expr::Binary(Binary::MulOrZero, b, rest) = graph.expr(second) else { return None };
         let Expr::Binary(Binary::Sub, one, subtracted) = graph.expr(rest) else { return None };
-        let is_whole = matches!(graph.expr(counts), Expr::Unary(Unary::Floor, _));
-        (subtracted == counts && is_whole).then_some(Self { sum, values: [a, b], counts, one })
+        let chooses = matches!(
+            graph.expr(counts),
+            Expr::Unary(Unary::Floor, _) | Expr::Binary(Binary::MinWeight | Binary::MaxWeight, ..)
+        );
+        (subtracted == counts && chooses).then_some(Self { sum, values: [a, b], counts, one })
     }
 
     /// The node that makes the choice.
@@ -40,18 +43,33 @@ impl Choice {
         self.sum
     }
 
+    /// a and b
+    pub fn values(&self) -> [Node; 2] {
+        self.values
+    }
+
+    /// c and the number that it is taken from
+    pub fn share(&self) -> (Node, Node) {
+        (self.counts, self.one)
+    }
+
     /// An interval that contains the chosen value, from those of the nodes before it. `None` if c may be something else
-    /// than 0 or 1.
+    /// than a number from 0 to 1.
     pub fn range(&self, of: impl Fn(Node) -> Interval) -> Option<Interval> {
         let counts = of(self.counts);
         let chooses = of(self.one) == Interval::point(1.0) && counts.lo >= 0.0 && counts.hi <= 1.0;
         let [a, b] = self.values.map(of);
-        chooses.then(|| match (counts.lo > 0.0, counts.hi < 1.0) {
+        chooses.then(|| match (counts.lo >= 1.0, counts.hi <= 0.0) {
             (true, _) => a,
             (_, true) => b,
             (false, false) => a.hull(b),
         })
     }
+}
+
+/// The numbers by which a graph chooses one of two values: ranges know what they do.
+pub(crate) fn choosing_numbers(graph: &Graph) -> Vec<Node> {
+    Choice::all(graph).into_iter().map(|choice| choice.counts).collect()
 }
 
 #[cfg(test)]

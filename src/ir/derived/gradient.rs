@@ -53,7 +53,9 @@ fn partials_within(graph: &mut Graph, root: Node, choices: usize) -> [Node; 4] {
             }
             continue;
         }
-        for (operand, contribution) in contributions(graph, node, adjoint, &depends) {
+        for (operand, contribution) in
+            contributions(graph, node, adjoint, |operand| depends.contains(&operand))
+        {
             let sum = match adjoints.get(&operand) {
                 None => contribution,
                 Some(&so_far) => graph.binary(Binary::Add, so_far, contribution),
@@ -94,24 +96,24 @@ fn contributions(
     graph: &mut Graph,
     node: Node,
     adjoint: Node,
-    depends: &FxHashSet<Node>,
+    depends: impl Fn(Node) -> bool,
 ) -> Vec<(Node, Node)> {
     let mut out = Vec::with_capacity(2);
     match graph.expr(node) {
         Expr::Constant(_) | Expr::Coordinate(_) | Expr::Parameter(_) | Expr::Uniform(_) => {}
         Expr::Unary(op, a) => {
-            if depends.contains(&a) {
+            if depends(a) {
                 let contribution = unary(graph, op, node, a, adjoint);
                 out.push((a, contribution));
             }
         }
         Expr::Binary(op, a, b) => {
-            if depends.contains(&a)
+            if depends(a)
                 && let Some(contribution) = binary(graph, op, node, [a, b], Side::First, adjoint)
             {
                 out.push((a, contribution));
             }
-            if depends.contains(&b)
+            if depends(b)
                 && let Some(contribution) = binary(graph, op, node, [a, b], Side::Second, adjoint)
             {
                 out.push((b, contribution));
@@ -120,12 +122,29 @@ fn contributions(
         // steps are not among what depends on coordinates: this is the value
         Expr::Lookup(lookup, at) => {
             let span = graph.span(node);
-            for (axis, operand) in at.into_iter().enumerate().filter(|(_, operand)| depends.contains(operand))
-            {
+            for (axis, operand) in at.into_iter().enumerate().filter(|(_, operand)| depends(*operand)) {
                 let slope = graph.intern(Expr::Lookup(lookup.with(Part::Slope(axis as u8)), at), span);
                 let contribution = graph.binary(Binary::Mul, adjoint, slope);
                 out.push((operand, contribution));
             }
+        }
+    }
+    out
+}
+
+/// For each operand that depends on coordinates, the derivative of a node by it.
+pub(super) fn partials_of(
+    graph: &mut Graph,
+    node: Node,
+    depends: impl Fn(Node) -> bool,
+) -> Vec<(Node, Node)> {
+    let one = graph.constant(1.0);
+    let mut out = contributions(graph, node, one, depends);
+    for (_, partial) in &mut out {
+        if let Expr::Binary(Binary::Mul, a, b) = graph.expr(*partial)
+            && (a == one || b == one)
+        {
+            *partial = if a == one { b } else { a };
         }
     }
     out

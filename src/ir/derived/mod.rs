@@ -1,6 +1,7 @@
 //! Graphs derived from a graph: what is computed beside ω itself.
 
 pub mod contact;
+pub mod forward;
 pub mod gradient;
 pub mod hoisted;
 pub mod localised;

@@ -40,6 +40,8 @@ pub struct LeafStore {
     uniforms: usize,
     /// For each leaf, whether machine code may answer for its slopes.
     tame_slopes: OnceLock<Vec<bool>>,
+    /// For each leaf, whether it may for its pieces.
+    tame_pieces: OnceLock<Vec<bool>>,
 }
 
 /// The leaves during a stretch of time: values are those at its end, ranges hold all of it.
@@ -75,7 +77,8 @@ impl LeafStore {
     pub fn new(engine: Engine, graph: &Graph, nodes: &[LeafNode]) -> Self {
         let mut known: HashMap<Vec<Expr>, u32> = HashMap::new();
         let (shapes, leaves, constants) = (Vec::new(), Vec::new(), Vec::new());
-        let mut out = Self { engine, shapes, leaves, constants, uniforms: 0, tame_slopes: OnceLock::new() };
+        let (tame_slopes, tame_pieces) = (OnceLock::new(), OnceLock::new());
+        let mut out = Self { engine, shapes, leaves, constants, uniforms: 0, tame_slopes, tame_pieces };
         for &LeafNode { node, factor } in nodes {
             let factor = if factor.is_normal() { factor } else { 1.0 };
             let (shape, root, constants) = graph.parametrised(node);
@@ -96,6 +99,7 @@ impl LeafStore {
         out
     }
 
+    #[inline]
     fn of(&self, leaf: u32) -> (&Shape, &[f64]) {
         let leaf = &self.leaves[leaf as usize];
         let shape = &self.shapes[leaf.shape as usize];
@@ -109,6 +113,16 @@ impl LeafStore {
         let is_tame = |leaf: u32| program(leaf).is_some_and(|program| program.is_tame(self.of(leaf).1));
         let all = || (0..self.leaves.len() as u32).map(is_tame).collect();
         if self.tame_slopes.get_or_init(all)[leaf as usize] { program(leaf) } else { None }
+    }
+
+    /// Whether machine code may answer for a leaf's pieces.
+    fn has_tame_pieces(&self, leaf: u32) -> bool {
+        let is_tame = |leaf: u32| {
+            let (shape, constants) = self.of(leaf);
+            shape.pieces().is_some_and(|pieces| pieces.is_tame(constants))
+        };
+        let all = || (0..self.leaves.len() as u32).map(is_tame).collect();
+        self.tame_pieces.get_or_init(all)[leaf as usize]
     }
 
     /// The leaves that move, with their shapes and constants.
@@ -138,6 +152,7 @@ impl Leaves {
         self.store.of(leaf).0.motion.is_some()
     }
 
+    #[inline]
     fn of(&self, leaf: u32) -> (&Shape, &[f64], &[f64]) {
         let (shape, constants) = self.store.of(leaf);
         let first = self.store.leaves[leaf as usize].first_uniform as usize;
@@ -196,7 +211,28 @@ impl Leaves {
     }
 
     fn range_on(&self, demand: Demand, leaf: u32, over: &Aabb) -> Interval {
-        let (shape, constants, uniforms) = self.of(leaf);
+        let own @ (shape, constants, uniforms) = self.of(leaf);
+        let whole = self.range_of_whole(demand, (leaf, own), over);
+        if whole == Interval::ALL || !whole.contains(0.0) || !uniforms.is_empty() {
+            return whole;
+        }
+        let Some(pieces) = shape.pieces() else { return whole };
+        let by_code = self.store.engine != Engine::Interpreter
+            && shape.pays(demand)
+            && self.store.has_tame_pieces(leaf);
+        let Some(range) = pieces.range(over, constants, by_code) else { return whole };
+        // roundings may part them
+        let (lo, hi) = (whole.lo.max(range.lo), whole.hi.min(range.hi));
+        if lo <= hi { Interval::new(lo, hi) } else { whole }
+    }
+
+    /// The range of a leaf's formula as it stands.
+    fn range_of_whole(
+        &self,
+        demand: Demand,
+        (leaf, (shape, constants, uniforms)): (u32, (&Shape, &[f64], &[f64])),
+        over: &Aabb,
+    ) -> Interval {
         if uniforms.is_empty() {
             let by_code = self.store.engine != Engine::Interpreter && self.store.leaves[leaf as usize].tame;
             if by_code

@@ -2,6 +2,7 @@
 
 mod faces;
 pub mod leaf_set;
+mod pieces;
 pub mod pruning;
 mod shape;
 pub mod tree;

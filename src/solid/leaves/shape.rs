@@ -4,6 +4,7 @@ use std::sync::OnceLock;
 
 use glam::DVec3;
 
+use super::pieces::Pieces;
 use crate::codegen;
 use crate::geom::Aabb;
 use crate::interval::Interval;
@@ -56,6 +57,7 @@ pub struct Shape {
     polynomial: OnceLock<Option<Evaluator>>,
     enclosures: OnceLock<EnclosureEvaluator>,
     slopes: OnceLock<Option<SlopeProgram>>,
+    pieces: OnceLock<Option<Pieces>>,
     contractor: OnceLock<Contractor>,
 }
 
@@ -73,8 +75,18 @@ impl SlopeProgram {
             return None;
         }
         let mut graph = shape.graph.clone();
-        let [x, y, z] = ir::gradient(&mut graph, shape.root);
-        let (graph, roots, _) = simplify(&graph, &[shape.root, x, y, z]);
+        let is_choice = |expr: &Expr| {
+            matches!(expr, Expr::Binary(Binary::Min | Binary::PlainMin | Binary::Max | Binary::PlainMax, ..))
+        };
+        let (graph, roots) = if graph.exprs().iter().any(is_choice) {
+            let [x, y, z] = ir::forward_gradient(&mut graph, shape.root);
+            graph.extract(&[shape.root, x, y, z])
+        } else {
+            // reverse mode has fewer operations
+            let [x, y, z] = ir::gradient(&mut graph, shape.root);
+            let (graph, roots, _) = simplify(&graph, &[shape.root, x, y, z]);
+            (graph, roots)
+        };
         let function = *roots.first()?;
         let code = RangeProgram::of_slopes(&graph, roots.try_into().ok()?, shape.parameters).ok()?;
         let ranges = RangeEvaluator::new(&graph, function);
@@ -165,6 +177,7 @@ impl Shape {
             polynomial,
             enclosures,
             slopes,
+            pieces: OnceLock::new(),
             contractor: OnceLock::new(),
         }
     }
@@ -187,7 +200,7 @@ impl Shape {
     }
 
     /// Whether ranges come from machine code.
-    fn pays(&self, demand: Demand) -> bool {
+    pub fn pays(&self, demand: Demand) -> bool {
         match demand {
             // those of a leaf that moves are asked for again and again
             Demand::Few => self.leaves >= MANY_LEAVES || self.motion.is_some(),
@@ -238,6 +251,15 @@ impl Shape {
     /// Ranges of the derivatives by machine code, where it pays.
     pub fn slopes(&self, engine: Engine) -> Option<&SlopeProgram> {
         self.slopes.get_or_init(|| SlopeProgram::new(self, engine)).as_ref()
+    }
+
+    /// The formula between its jumps; `None` without jumps, and for leaves that move.
+    pub fn pieces(&self) -> Option<&Pieces> {
+        let make = || match self.motion {
+            Some(_) => None,
+            None => Pieces::new(&self.graph, self.root, self.parameters),
+        };
+        self.pieces.get_or_init(make).as_ref()
     }
 
     /// Derivatives over boxes, and what makes boxes smaller around the points where a leaf is positive.
