@@ -167,7 +167,8 @@ pub(super) struct Check {
     /// Time at which moving solids are evaluated, in seconds or with a unit
     #[arg(long, value_name = "TIME", default_value_t = 0.0, value_parser = seconds, allow_negative_numbers = true)]
     pub time: f64,
-    /// Time after which no further solid of a file is measured, in seconds or with a unit
+    /// Time for measuring the solids of a file, in seconds or with a unit. No solid is begun after it, and what is not
+    /// finished by then is left out, and said
     #[arg(long, value_name = "TIME", default_value_t = 10.0, value_parser = seconds)]
     pub budget: f64,
     /// Treat warnings as errors: all of them (`warnings`), or those with a code (W0401); may be repeated
@@ -289,6 +290,10 @@ pub(super) struct Mesh {
     /// the mesh's diagonal as in 0.1%. The distance is measured; vertices stay on the surface
     #[arg(long, value_name = "ERROR", value_parser = tolerance, allow_negative_numbers = true)]
     pub simplify: Option<Tolerance>,
+    /// Time to look for what the mesh misses, in seconds or with a unit [default: 10 s, or three times that of meshing
+    /// if it is longer]
+    #[arg(long, value_name = "TIME", value_parser = seconds)]
+    pub budget: Option<f64>,
     /// Measure the mesh against the surface and the surface against the mesh: takes longer than meshing
     #[arg(long)]
     pub quality: bool,

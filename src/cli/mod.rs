@@ -12,6 +12,7 @@ mod args;
 mod build;
 mod check;
 mod choose;
+mod deadline;
 mod eval;
 mod explain;
 mod failure;

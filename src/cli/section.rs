@@ -6,14 +6,15 @@ use std::path::{Path, PathBuf};
 use glam::{DVec2, DVec3};
 
 use super::args::{Check, MessageFormat, Plotted, Shared};
+use super::deadline::Deadline;
 use super::failure::{Failure, note};
-use super::mesh::hidden;
+use super::mesh::{LEAST_SEARCH, hidden};
 use super::output::Shown;
 use super::{choose, output};
 use rfm::diagnostic::{Code, Diagnostic, Span};
 use rfm::field::Field;
 use rfm::geom::Aabb;
-use rfm::mesh::{Grid, MeshDistance, Resolution, dual_contouring, marching_cubes, thin_cells};
+use rfm::mesh::{Grid, MeshDistance, Resolution, Unwatched, dual_contouring, marching_cubes, thin_cells};
 use rfm::slice::{self, Cut as SolidCut, Panel, Plane, Quantity, Style, Window};
 use rfm::solid::{Bounds, Chosen};
 use rfm::{Program, Solid};
@@ -171,12 +172,18 @@ impl Depth {
         let grid =
             Grid::around(&bounds, Resolution::Cells(CELLS_OF_DISTANCE)).map_err(|error| refused(&error))?;
         let surface = solid.surface(*grid.bounds());
-        let sharp = dual_contouring(&*surface, &grid, &|_| {}).map_err(|error| refused(&error))?;
-        let thin = thin_cells(&*surface, &grid).map_err(|error| refused(&error))?;
+        let sharp = dual_contouring(&*surface, &grid, &Unwatched).map_err(|error| refused(&error))?;
+        let thin =
+            thin_cells(&*surface, &grid, &Deadline::after(LEAST_SEARCH)).map_err(|error| refused(&error))?;
         if thin.count > 0 {
             note(format!(
                 "distances are measured from a mesh of `{name}`, which misses what is thinner than a cell {}",
                 hidden(&thin, &grid)
+            ));
+        }
+        if thin.ended {
+            note(format!(
+                "distances are measured from a mesh of `{name}`; whether it misses what is thin was not found out in time"
             ));
         }
         let name = name.to_string();
@@ -184,7 +191,7 @@ impl Depth {
             return Ok(Self { name, distance });
         }
         // one without sharp edges never touches itself
-        let plain = marching_cubes(&*surface, &grid, &|_| {}).map_err(|error| refused(&error))?;
+        let plain = marching_cubes(&*surface, &grid, &Unwatched).map_err(|error| refused(&error))?;
         let distance = MeshDistance::of(&plain).map_err(|error| refused(&error))?;
         Ok(Self { name, distance })
     }

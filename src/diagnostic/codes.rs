@@ -195,8 +195,9 @@ THIN_PARTS = "W0408":
 "Parts of the solid, or gaps in it, are thinner than the cells of the grid that it was measured on, and pass between
 its nodes or beside its triangles: they are missing from its volume, and from a mesh with as many cells. The message says
 where the thinnest is and how many cells would show it. Each cell that is counted holds a point of a surface which the
-grid does not know, so surfaces that only touch, as in `a and not a`, do not count. Edges of wedges count as well: every grid
-shows them a little blunt. If there is nothing else the message says so, and the volume is measured all the same.";
+grid does not know, so surfaces that only touch, as in `a and not a`, do not count. Edges of wedges and tips of cones
+count as well: every grid shows them a little blunt. If there is nothing else the message says so, and the volume is
+measured all the same.";
 LARGE_ANGLE = "W0409":
 "Angles are radians unless a unit says otherwise, and this one is more than a whole turn. Write `45 deg` for degrees, or
 `45 rad` if radians are meant.";

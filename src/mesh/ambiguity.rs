@@ -177,6 +177,7 @@ mod tests {
     use rayon::prelude::*;
 
     use crate::geom::Aabb;
+    use crate::mesh::Unwatched;
     use crate::mesh::tests::{Formula, between_nodes};
     use crate::mesh::{Grid, Resolution, check, dual_contouring, marching_cubes};
 
@@ -353,7 +354,7 @@ mod tests {
         let domain = Aabb::new(DVec3::ZERO, DVec3::splat((n - 1) as f64));
         let grid = Grid::filling(&domain, Resolution::Spacing(1.0)).unwrap();
         let reports = [marching_cubes, dual_contouring].map(|method| {
-            let report = check(&method(&field, &grid, &|_| ()).unwrap(), &field);
+            let report = check(&method(&field, &grid, &Unwatched).unwrap(), &field);
             assert!(report.closed && report.manifold, "grid {n}³ {seed}: {report:?}");
             report
         });

@@ -15,7 +15,7 @@ use glam::DVec3;
 use rayon::prelude::*;
 
 use super::{
-    MeshError,
+    MeshError, Watch,
     collapse::AtNode,
     prune::{Bricks, Lattice},
     roots::{AxisEdges, RootFinder},
@@ -32,44 +32,57 @@ pub(super) struct ProgressPart<'a> {
     done: AtomicUsize,
     /// The shares of all work that are done before this part and after it.
     shares: Range<f64>,
-    progress: &'a (dyn Fn(f64) + Sync),
+    watch: &'a dyn Watch,
 }
 
 impl<'a> ProgressPart<'a> {
-    /// A part of the work in which [`Self::advance`] will be called `tasks` times.
-    pub(super) fn new(tasks: usize, shares: Range<f64>, progress: &'a (dyn Fn(f64) + Sync)) -> Self {
-        Self { tasks, done: AtomicUsize::new(0), shares, progress }
+    /// A part of the work in which [`Self::run`] will be called `tasks` times.
+    pub(super) fn new(tasks: usize, shares: Range<f64>, watch: &'a dyn Watch) -> Self {
+        Self { tasks, done: AtomicUsize::new(0), shares, watch }
     }
 
-    pub(super) fn advance(&self) {
+    /// Does a task, unless the work is to end, and tells that it is done.
+    ///
+    /// # Errors
+    /// Those of the task, and [`MeshError::Ended`].
+    pub(super) fn run<R>(&self, task: impl FnOnce() -> Result<R, MeshError>) -> Result<R, MeshError> {
+        ended(self.watch)?;
+        let found = task()?;
         let done = self.done.fetch_add(1, Ordering::Relaxed) + 1;
         let share = done as f64 / self.tasks as f64;
-        (self.progress)(self.shares.start + (self.shares.end - self.shares.start) * share);
+        self.watch.progress(self.shares.start + (self.shares.end - self.shares.start) * share);
+        Ok(found)
     }
 }
 
-/// Samples the signs at the nodes of all near bricks. Adds to the number of evaluations and calls `advance`
-/// after each task.
+/// # Errors
+/// [`MeshError::Ended`] if the work is to end.
+pub(super) fn ended(watch: &dyn Watch) -> Result<(), MeshError> {
+    if watch.is_over() { Err(MeshError::Ended) } else { Ok(()) }
+}
+
+/// Samples the signs at the nodes of all near bricks. Adds to the number of evaluations.
 ///
 /// # Errors
-/// [`MeshError::NotANumber`] at the first NaN.
+/// [`MeshError::NotANumber`] at the first NaN, and [`MeshError::Ended`].
 pub(super) fn sample(
     field: &dyn Field,
     lattice: &Lattice,
     bricks: &Bricks,
     evaluations: &mut u64,
-    advance: &(dyn Fn() + Sync),
+    part: &ProgressPart<'_>,
 ) -> Result<Vec<Signs>, MeshError> {
     let mut signs = vec![Signs::default(); bricks.near.len()];
     let tasks = signs.par_chunks_mut(BRICKS_PER_TASK).zip(bricks.near.par_chunks(BRICKS_PER_TASK));
     let counts: Vec<Result<u64, MeshError>> = tasks
         .map_init(SignSampler::default, |samples, (signs, bricks)| {
-            let mut count = 0;
-            for (signs, brick) in signs.iter_mut().zip(bricks) {
-                *signs = samples.take(field, lattice, brick, &mut count)?;
-            }
-            advance();
-            Ok(count)
+            part.run(|| {
+                let mut count = 0;
+                for (signs, brick) in signs.iter_mut().zip(bricks) {
+                    *signs = samples.take(field, lattice, brick, &mut count)?;
+                }
+                Ok(count)
+            })
         })
         .collect();
     for count in counts {

@@ -24,28 +24,24 @@ use super::{
     },
 };
 use crate::field::Field;
+use crate::mesh::Watch;
 
 /// The surface ω = 0 of a field as a closed mesh. It is empty if no node of the grid lies inside.
 ///
 /// Inside is strictly ω > 0. Everything outside the grid counts as outside, so a solid cut by the border is
-/// closed by faces on it (see [`Mesh::caps`]). `progress` is called from any thread with the share of tasks
-/// done, in (0, 1], not always in ascending order. Source: W. Lorensen, H. Cline, Marching cubes, SIGGRAPH
+/// closed by faces on it (see [`Mesh::caps`]). `watch` is told the share of tasks
+/// done, and may end them. Source: W. Lorensen, H. Cline, Marching cubes, SIGGRAPH
 /// 1987, with the decisions about ambiguous cells of `ambiguity`.
 ///
 /// # Errors
 /// [`MeshError::NotANumber`] if ω is NaN at a node or on an edge that crosses the surface,
-/// [`MeshError::TooManyVertices`] beyond [`Mesh::MAX_VERTICES`].
-pub fn marching_cubes(
-    field: &dyn Field,
-    grid: &Grid,
-    progress: &(dyn Fn(f64) + Sync),
-) -> Result<Mesh, MeshError> {
+/// [`MeshError::TooManyVertices`] beyond [`Mesh::MAX_VERTICES`], [`MeshError::Ended`] if `watch` ends the work.
+pub fn marching_cubes(field: &dyn Field, grid: &Grid, watch: &dyn Watch) -> Result<Mesh, MeshError> {
     let lattice = Lattice::new(grid);
     let near = Bricks::classify(field, &lattice);
     let mut mesh = Mesh::default();
-    let sampling = ProgressPart::new(near.near.len().div_ceil(BRICKS_PER_TASK), 0.0..0.5, progress);
-    let signs =
-        crossings::sample(field, &lattice, &near, &mut mesh.work.evaluations, &|| sampling.advance())?;
+    let sampling = ProgressPart::new(near.near.len().div_ceil(BRICKS_PER_TASK), 0.0..0.5, watch);
+    let signs = crossings::sample(field, &lattice, &near, &mut mesh.work.evaluations, &sampling)?;
     let crossed = Crossed::number(&near, &signs, |brick, around| {
         let cells = BrickTriangles::new(field, &lattice, brick.low, around);
         brick.inner = cells.patches.iter().map(|patch| patch.inner.len() as u32).sum();
@@ -59,7 +55,7 @@ pub fn marching_cubes(
     let counts: Vec<usize> = counts.collect();
     mesh.triangles = rayon::iter::repeat_n([0; 3], counts.iter().sum()).collect();
 
-    let marching = ProgressPart::new(crossed.tasks.len(), 0.5..1.0, progress);
+    let marching = ProgressPart::new(crossed.tasks.len(), 0.5..1.0, watch);
     let vertices = || crossed.tasks.iter().map(|task| task.vertices);
     let positions = crossings::parts(&mut mesh.positions, vertices());
     let normals = crossings::parts(&mut mesh.normals, vertices());
@@ -68,9 +64,8 @@ pub fn marching_cubes(
     let jobs = crossed.tasks.par_iter().zip(positions).zip(normals).zip(triangles);
     let found: Vec<Result<OnEdges, MeshError>> = jobs
         .map_init(ExtractionScratch::default, |scratch, (((task, positions), normals), triangles)| {
-            let found = extraction.extract(ExtractionJob { task, positions, normals, triangles }, scratch);
-            marching.advance();
-            found
+            let job = ExtractionJob { task, positions, normals, triangles };
+            marching.run(|| extraction.extract(job, scratch))
         })
         .collect();
     for cells in crossed.tasks.iter().flat_map(|task| &task.kept) {

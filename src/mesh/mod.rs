@@ -58,6 +58,7 @@ mod simplify;
 mod slivers;
 mod thin;
 mod volume;
+mod watch;
 
 #[cfg(test)]
 mod tests;
@@ -81,6 +82,7 @@ pub use simplify::simplify;
 pub use slivers::remove_slivers;
 pub use thin::{ThinCells, thin_cells};
 pub use volume::{Volume, VolumeError, volume};
+pub use watch::{Unwatched, Watch};
 
 /// A triangle mesh with shared vertices.
 ///
@@ -184,6 +186,8 @@ pub enum MeshError {
         /// The number of vertices that was found.
         found: usize,
     },
+    /// The work was ended by who waited for it, see [`Watch::is_over`].
+    Ended,
 }
 
 impl MeshError {
@@ -199,6 +203,7 @@ impl fmt::Display for MeshError {
             Self::NotANumber { at } => {
                 write!(f, "the field is not a number at ({}, {}, {})", at.x + 0.0, at.y + 0.0, at.z + 0.0)
             }
+            Self::Ended => write!(f, "the mesh was not finished: it was ended before"),
             Self::TooManyVertices { found } => {
                 let most = Mesh::MAX_VERTICES;
                 write!(

@@ -20,6 +20,7 @@ use super::{
     shells,
 };
 use crate::field::Field;
+use crate::mesh::Unwatched;
 
 /// Distances of many samples in metres, or angles of many samples in degrees.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
@@ -118,7 +119,7 @@ impl<'a> Reference<'a> {
     /// Those of [`dual_contouring`] in the finer grid that gives points of the surface.
     pub fn new(field: &dyn Field, distance: &'a dyn Field, grid: &Grid) -> Result<Self, MeshError> {
         let finer = Grid::filling(grid.bounds(), Resolution::Spacing(0.5 * grid.spacing().min_element()));
-        let finer = dual_contouring(field, finer.as_ref().unwrap_or(grid), &|_| ())?;
+        let finer = dual_contouring(field, finer.as_ref().unwrap_or(grid), &Unwatched)?;
         Ok(Self { distance, points: surface_points(&finer, distance, grid), extent: extent(&finer) })
     }
 
@@ -414,7 +415,7 @@ mod tests {
         };
         let bounds = Aabb::new(DVec3::NEG_ONE, DVec3::ONE);
         let grid = Grid::around(&bounds, Resolution::Cells(40)).unwrap();
-        let mesh = marching_cubes(&ball(0.9), &grid, &|_| ()).unwrap();
+        let mesh = marching_cubes(&ball(0.9), &grid, &Unwatched).unwrap();
         let quality = measure(&mesh, &ball(1.0), &ball(1.0), &grid).unwrap();
         let chord = 3.0 * grid.spacing().x.powi(2) / 8.0 / 0.9;
         for found in [quality.to_surface, quality.from_surface] {
@@ -441,7 +442,7 @@ mod tests {
             Closures { omega: |p: DVec3| 0.3 - p.length(), gradient: |p: DVec3| -p.normalize_or(DVec3::X) };
         let bounds = Aabb::new(DVec3::splat(-0.4), DVec3::new(1.4, 0.4, 0.4));
         let grid = Grid::filling(&bounds, Resolution::Cells(45)).unwrap();
-        let mesh = marching_cubes(&one, &grid, &|_| ()).unwrap();
+        let mesh = marching_cubes(&one, &grid, &Unwatched).unwrap();
         let quality = measure(&mesh, &two, &two, &grid).unwrap();
         assert!(quality.to_surface.max < 0.01, "{quality:?}");
         assert!((quality.from_surface.max - 1.0).abs() < 0.02, "{quality:?}");
@@ -453,7 +454,7 @@ mod tests {
         let ball =
             Closures { omega: |p: DVec3| 0.8 - p.length(), gradient: |p: DVec3| -p.normalize_or(DVec3::X) };
         let grid = Grid::around(&Aabb::new(DVec3::NEG_ONE, DVec3::ONE), Resolution::Cells(16)).unwrap();
-        let mut mesh = marching_cubes(&ball, &grid, &|_| ()).unwrap();
+        let mut mesh = marching_cubes(&ball, &grid, &Unwatched).unwrap();
         mesh.triangles[7].swap(0, 1);
         mesh.triangles[100].swap(1, 2);
         assert_eq!(measure(&mesh, &ball, &ball, &grid).unwrap().flipped, 2);

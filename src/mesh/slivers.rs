@@ -111,6 +111,7 @@ mod tests {
     use super::*;
     use crate::field::{Closures, Field};
     use crate::geom::Aabb;
+    use crate::mesh::Unwatched;
     use crate::mesh::{Grid, Resolution, check, marching_cubes};
 
     fn share_of_slivers(mesh: &Mesh) -> f64 {
@@ -140,7 +141,7 @@ mod tests {
         for field in [&ball as &dyn Field, &torus] {
             let bounds = Aabb::new(DVec3::splat(-1.0), DVec3::splat(1.0));
             let grid = Grid::around(&bounds, Resolution::Cells(64)).unwrap();
-            let mut mesh = marching_cubes(field, &grid, &|_| ()).unwrap();
+            let mut mesh = marching_cubes(field, &grid, &Unwatched).unwrap();
             let (share, before) = (share_of_slivers(&mesh), check(&mesh, field));
             let removed = remove_slivers(&mut mesh);
             let after = check(&mesh, field);

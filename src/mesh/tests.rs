@@ -64,7 +64,7 @@ pub(super) fn cube(half_side: f64) -> Aabb {
 }
 
 fn mesh_in(field: &dyn Field, grid: &Grid) -> Mesh {
-    marching_cubes(field, grid, &|_| ()).unwrap()
+    marching_cubes(field, grid, &Unwatched).unwrap()
 }
 
 /// Meshes in a padded grid and checks what must hold of every mesh.
@@ -291,7 +291,7 @@ fn shell_of_one_cell_keeps_its_cavity_and_a_thinner_one_falls_to_pieces_but_stay
 fn nan_is_an_error_that_names_the_point() {
     let field = Formula(|p: DVec3| if p.x > 0.4 { f64::NAN } else { 0.3 - p.length() });
     let grid = Grid::around(&cube(1.0), Resolution::Cells(16)).unwrap();
-    let found = marching_cubes(&field, &grid, &|_| ());
+    let found = marching_cubes(&field, &grid, &Unwatched);
     assert!(matches!(found, Err(MeshError::NotANumber { at }) if at.x > 0.4), "{found:?}");
 }
 
@@ -363,6 +363,44 @@ fn progress_ends_at_one() {
     // without ranges all 6³ bricks are near: 14 tasks that take samples, and then those that make triangles
     assert!((15..=28).contains(&seen.len()), "{}", seen.len());
     assert_eq!(seen.iter().filter(|share| **share <= 0.5).count(), 14);
+}
+
+/// Ends the work when its first task is done.
+#[derive(Default)]
+struct Impatient(std::sync::atomic::AtomicBool);
+
+impl Watch for Impatient {
+    fn progress(&self, _done: f64) {
+        self.0.store(true, std::sync::atomic::Ordering::Relaxed);
+    }
+    fn is_over(&self) -> bool {
+        self.0.load(std::sync::atomic::Ordering::Relaxed)
+    }
+}
+
+#[test]
+fn who_waits_may_end_the_work() {
+    let asked = std::sync::atomic::AtomicUsize::new(0);
+    let counted = |p: DVec3| {
+        asked.fetch_add(1, std::sync::atomic::Ordering::Relaxed);
+        1.0 - p.length_squared()
+    };
+    let field = Formula(counted);
+    let grid = Grid::around(&cube(1.0), Resolution::Cells(40)).unwrap();
+    let ended_after = |mesher: fn(&dyn Field, &Grid, &dyn Watch) -> Result<Mesh, MeshError>| {
+        asked.store(0, std::sync::atomic::Ordering::Relaxed);
+        assert_eq!(mesher(&field, &grid, &Impatient::default()), Err(MeshError::Ended));
+        asked.load(std::sync::atomic::Ordering::Relaxed)
+    };
+    // without ranges all of some 70 000 nodes are asked for in 14 tasks; a few of them may be under way
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(2).build().unwrap();
+    for mesher in [marching_cubes, dual_contouring] {
+        let asked = pool.install(|| ended_after(mesher));
+        assert!(asked < 20_000, "{asked}");
+    }
+    let over = Impatient(true.into());
+    assert_eq!(volume(&field, &cube(1.0), 40, &over), Err(VolumeError::Mesh(MeshError::Ended)));
+    assert_eq!(thin_cells(&field, &grid, &over), Ok(ThinCells { ended: true, ..ThinCells::NONE }));
 }
 
 /// A ball with an exact range.

@@ -10,8 +10,8 @@
 //! touch zero are not counted, since they have no witness; nor are steps and edges of parts and gaps that are
 //! thicker than two cells.
 //!
-//! Invariant: a cell that is not counted is proven to hold what the grid says, or it was searched down to an
-//! eighth of a cell without a witness.
+//! Invariant: unless the search was ended, a cell that is not counted is proven to hold what the grid says, or it was
+//! searched down to an eighth of a cell without a witness.
 
 mod edges;
 mod found;
@@ -22,11 +22,12 @@ use std::cell::RefCell;
 use rayon::prelude::*;
 
 use super::{
-    Grid, MeshError,
-    crossings::sample,
+    Grid, MeshError, Watch,
+    crossings::{BRICKS_PER_TASK, ProgressPart, sample},
     patches::undecided_cells,
     prune::{BRICK, Bricks, Lattice},
     signs::{Brick, Signs, crossed_cells},
+    watch::Ends,
 };
 use crate::{field::Field, geom::Aabb};
 use edges::BrickEdges;
@@ -36,12 +37,21 @@ pub use found::ThinCells;
 
 /// Counts the cells of a grid in which [`marching_cubes`](super::marching_cubes) misses a part of the surface.
 ///
+/// The search takes as long as the surface is intricate. If `watch` ends it, what was found so far is returned, and
+/// [`ThinCells::ended`] says so. How far it is, nobody is told.
+///
 /// # Errors
 /// [`MeshError::NotANumber`] if ω is NaN at a node.
-pub fn thin_cells(field: &dyn Field, grid: &Grid) -> Result<ThinCells, MeshError> {
+pub fn thin_cells(field: &dyn Field, grid: &Grid, watch: &dyn Watch) -> Result<ThinCells, MeshError> {
     let lattice = Lattice::new(grid);
     let near = Bricks::classify(field, &lattice);
-    let signs = sample(field, &lattice, &near, &mut 0, &|| ())?;
+    let quiet = Ends(watch);
+    let sampling = ProgressPart::new(near.near.len().div_ceil(BRICKS_PER_TASK), 0.0..1.0, &quiet);
+    let signs = match sample(field, &lattice, &near, &mut 0, &sampling) {
+        Ok(signs) => signs,
+        Err(MeshError::Ended) => return Ok(ThinCells::ENDED),
+        Err(error @ (MeshError::NotANumber { .. } | MeshError::TooManyVertices { .. })) => return Err(error),
+    };
     let cells = grid.cells();
     let parts: Vec<ThinCells> = (0..near.near.len())
         .into_par_iter()
@@ -50,12 +60,16 @@ pub fn thin_cells(field: &dyn Field, grid: &Grid) -> Result<ThinCells, MeshError
             if brick.solid {
                 return ThinCells::NONE;
             }
+            if watch.is_over() {
+                return ThinCells::ENDED;
+            }
             let around = Brick::new(&near, &signs, number).around(&signs);
             let crossed = std::array::from_fn(|z| crossed_cells(&around.corners(z)));
             let undecided = std::array::from_fn(|z| undecided_cells(&around.corners(z)));
             let low = brick.at.map(|b| b * BRICK);
             let edges = RefCell::new(BrickEdges::new(low));
-            Search { field, lattice: &lattice, low, cells, crossed, undecided, edges }.count([0; 3], BRICK)
+            Search { field, lattice: &lattice, low, cells, crossed, undecided, edges, watch }
+                .count([0; 3], BRICK)
         })
         .collect();
     Ok(parts.into_iter().fold(ThinCells::NONE, ThinCells::and))
@@ -72,6 +86,7 @@ struct Search<'a> {
     crossed: Signs,
     undecided: Signs,
     edges: RefCell<BrickEdges>,
+    watch: &'a dyn Watch,
 }
 
 impl Search<'_> {
@@ -87,6 +102,9 @@ impl Search<'_> {
         let bounds = Aabb::new(self.lattice.position(low), self.lattice.position(high));
         if look::is_decided(self.field.range(&bounds)) {
             return ThinCells::NONE;
+        }
+        if self.watch.is_over() {
+            return ThinCells::ENDED;
         }
         if size == 1 {
             if (0..3).any(|axis| low[axis] == 0) {
@@ -119,7 +137,7 @@ mod tests {
     use super::*;
     use crate::field::Sheet;
     use crate::interval::Interval;
-    use crate::mesh::Resolution;
+    use crate::mesh::{Resolution, Unwatched};
 
     /// A shell between two balls, with its exact range up to rounding.
     struct HollowBall {
@@ -147,7 +165,7 @@ mod tests {
 
     fn thin(field: &dyn Field, cells: usize) -> ThinCells {
         let domain = Aabb::new(DVec3::splat(-1.0), DVec3::splat(1.0));
-        thin_cells(field, &Grid::filling(&domain, Resolution::Cells(cells)).unwrap()).unwrap()
+        thin_cells(field, &Grid::filling(&domain, Resolution::Cells(cells)).unwrap(), &Unwatched).unwrap()
     }
 
     #[test]

@@ -45,6 +45,7 @@ mod tests {
     use super::*;
     use crate::field::Closures;
     use crate::geom::Aabb;
+    use crate::mesh::Unwatched;
     use crate::mesh::{Grid, Resolution, marching_cubes};
 
     #[test]
@@ -53,7 +54,7 @@ mod tests {
             Closures { omega: |p: DVec3| 1.0 - p.length(), gradient: |p: DVec3| -p.normalize_or_zero() };
         let domain = Aabb::new(DVec3::splat(-1.2), DVec3::splat(1.2));
         let grid = Grid::filling(&domain, Resolution::Cells(60)).unwrap();
-        let mesh = marching_cubes(&ball, &grid, &|_| {}).unwrap();
+        let mesh = marching_cubes(&ball, &grid, &Unwatched).unwrap();
         let few = coarse(&mesh, 0.1);
         assert!(5 * few.triangles.len() < mesh.triangles.len() && few.triangles.len() > 500);
         // means of points of a sphere within a cell lie below it by the height of the cap, d²/8 at most

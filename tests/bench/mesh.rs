@@ -14,7 +14,7 @@ use std::time::{Duration, Instant};
 use rfm::field::Field;
 use rfm::geom::Aabb;
 use rfm::glam::DVec3;
-use rfm::mesh::{Grid, Mesh, Resolution, check, dual_contouring, marching_cubes, measure};
+use rfm::mesh::{Grid, Mesh, Resolution, Unwatched, check, dual_contouring, marching_cubes, measure};
 use rfm::solid::Depth;
 use rfm::{Engine, Program, Solid};
 
@@ -58,11 +58,11 @@ type Method = (&'static str, fn(&dyn Field, &Grid) -> Mesh);
 const METHODS: [Method; 2] = [("mc", cubes), ("dc", dual)];
 
 fn cubes(field: &dyn Field, grid: &Grid) -> Mesh {
-    marching_cubes(field, grid, &|_| {}).unwrap_or_else(|e| panic!("{e}"))
+    marching_cubes(field, grid, &Unwatched).unwrap_or_else(|e| panic!("{e}"))
 }
 
 fn dual(field: &dyn Field, grid: &Grid) -> Mesh {
-    dual_contouring(field, grid, &|_| {}).unwrap_or_else(|e| panic!("{e}"))
+    dual_contouring(field, grid, &Unwatched).unwrap_or_else(|e| panic!("{e}"))
 }
 
 /// Both methods side by side: time, and the quality of the mesh. To choose between them, look at the last

@@ -7,7 +7,7 @@ use rayon::prelude::*;
 use rfm::field::{GradientsMut, Points, Walls};
 use rfm::geom::Aabb;
 use rfm::glam::DVec3;
-use rfm::mesh::{Grid, Resolution, check, marching_cubes};
+use rfm::mesh::{Grid, Resolution, Unwatched, check, marching_cubes};
 use rfm::solid::{CellMap, Place};
 use rfm::{Engine, Field, Program, Solid};
 
@@ -161,7 +161,7 @@ fn the_mesh_is_the_same() {
     let map = CellMap::new(&solid, domain()).unwrap();
     let grid = Grid::filling(&domain(), Resolution::Cells(80)).unwrap();
     let [with, without] = [&map as &dyn Walls, &solid.twin()].map(|field| {
-        let mesh = marching_cubes(field, &grid, &|_| {}).unwrap();
+        let mesh = marching_cubes(field, &grid, &Unwatched).unwrap();
         check(&mesh, field)
     });
     assert_eq!(

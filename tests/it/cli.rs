@@ -243,6 +243,27 @@ fn check_as_json() {
 }
 
 #[test]
+fn what_is_not_finished_in_the_time_for_it_is_said() {
+    // details in every cell: minutes of work
+    let text = "rfm 1\nsolid s = (noise(40*[x, y, z]) or noise(200*[x, y, z])) and box()".as_bytes();
+    let outcome = rfm_reading(root(), &["check", "--json", "--budget", "1", "-"], text).expect(0);
+    let solid = &outcome.json()["solids"][0];
+    assert_eq!(solid["unfinished"], serde_json::json!(["volume", "thin_cells"]), "{solid}");
+    assert!(
+        solid["bounds"].is_object() && solid["volume"].is_null() && solid["thin_cells"].is_null(),
+        "{solid}"
+    );
+    let outcome = rfm_reading(root(), &["check", "--budget", "1", "-"], text).expect(0);
+    assert!(outcome.stdout.contains("not found: its meshes were not finished in time"), "{}", outcome.stdout);
+    assert!(outcome.stderr.contains("the search for thin parts of `s` was ended"), "{}", outcome.stderr);
+
+    let outcome = rfm(root(), &["mesh", "--json", "--budget", "0", PAWN, "--cells", "16"]).expect(0);
+    let mesh = outcome.json();
+    assert!(mesh["thin_cells"].is_null() && mesh["closed"] == true, "{mesh}");
+    assert!(outcome.stderr.contains("--budget gives it more time"), "{}", outcome.stderr);
+}
+
+#[test]
 fn findings_and_denied_warnings() {
     let text = b"rfm 1\nlet spare = 1\nsolid s = sphere(1)";
     rfm_reading(root(), &["check", "-"], text).expect(0);

@@ -7,7 +7,7 @@ use dashu_int::IBig;
 use proptest::test_runner::TestRunner;
 use rfm::geom::Aabb;
 use rfm::glam::DVec3;
-use rfm::mesh::{Grid, Mesh, Resolution, dual_contouring, self_intersections};
+use rfm::mesh::{Grid, Mesh, Resolution, Unwatched, dual_contouring, self_intersections};
 use rfm::{Engine, Program, Solid};
 
 use super::mesh_properties::{DOMAIN, config, csg, solid as random_solid};
@@ -135,7 +135,7 @@ fn solid(text: &str) -> Solid {
 fn sharp(solid: &Solid, cells: usize) -> Mesh {
     let bounds = solid.bounds().aabb().unwrap();
     let grid = Grid::around(&bounds, Resolution::Cells(cells)).unwrap();
-    dual_contouring(&*solid.surface(*grid.bounds()), &grid, &|_| {}).unwrap()
+    dual_contouring(&*solid.surface(*grid.bounds()), &grid, &Unwatched).unwrap()
 }
 
 #[track_caller]
@@ -228,7 +228,7 @@ fn random_solids(count: u32, is_cut: bool) {
     let result = runner.run(&(csg(), 8..28_usize), |(text, cells)| {
         let field = random_solid(&text, is_cut);
         let grid = Grid::filling(&DOMAIN, Resolution::Cells(cells)).unwrap();
-        let mesh = dual_contouring(&*field.surface(DOMAIN), &grid, &|_| ()).unwrap();
+        let mesh = dual_contouring(&*field.surface(DOMAIN), &grid, &Unwatched).unwrap();
         let found = crossings(&mesh);
         proptest::prop_assert_eq!(found, 0, "{} pairs, {} cells, {}", found, cells, text);
         Ok(())

@@ -7,7 +7,7 @@ use proptest::prelude::*;
 use proptest::test_runner::{RngSeed, TestRunner};
 use rfm::geom::Aabb;
 use rfm::glam::DVec3;
-use rfm::mesh::{Grid, Resolution, check, dual_contouring, marching_cubes, measure, shells};
+use rfm::mesh::{Grid, Resolution, Unwatched, check, dual_contouring, marching_cubes, measure, shells};
 use rfm::solid::Depth;
 use rfm::{Engine, Program, Solid};
 
@@ -69,8 +69,8 @@ proptest! {
         let field = solid(&text, is_cut);
         let field = field.surface(DOMAIN);
         let grid = Grid::filling(&DOMAIN, Resolution::Cells(cells)).unwrap();
-        let sharp = check(&dual_contouring(&*field, &grid, &|_| ()).unwrap(), &*field);
-        let cubes = check(&marching_cubes(&*field, &grid, &|_| ()).unwrap(), &*field);
+        let sharp = check(&dual_contouring(&*field, &grid, &Unwatched).unwrap(), &*field);
+        let cubes = check(&marching_cubes(&*field, &grid, &Unwatched).unwrap(), &*field);
         // closed says that triangles run along each edge in opposite directions
         prop_assert!(sharp.closed && sharp.manifold, "{:?}", sharp);
         prop_assert_eq!((sharp.components, sharp.euler), (cubes.components, cubes.euler));
@@ -92,7 +92,7 @@ fn are_hardly_folded(tried: u32) {
         let solid = solid(&text, false);
         let field = solid.surface(DOMAIN);
         let grid = Grid::filling(&DOMAIN, Resolution::Cells(cells)).unwrap();
-        let sharp = dual_contouring(&*field, &grid, &|_| ()).unwrap();
+        let sharp = dual_contouring(&*field, &grid, &Unwatched).unwrap();
         let quality = measure(&sharp, &*field, &Depth(&solid), &grid).unwrap();
         let h = grid.spacing().x;
         let is_large = shells(&sharp).iter().all(|shell| shell.area > 4.0 * h * h);

@@ -4,7 +4,7 @@ use rfm::field::Closures;
 use rfm::geom::Aabb;
 use rfm::glam::DVec3;
 use rfm::mesh::{
-    Grid, Mesh, Quality, Resolution, check, dual_contouring, marching_cubes, measure, thin_cells,
+    Grid, Mesh, Quality, Resolution, Unwatched, check, dual_contouring, marching_cubes, measure, thin_cells,
 };
 use rfm::{Engine, Program, Solid};
 
@@ -19,7 +19,7 @@ fn example(name: &str) -> Solid {
 }
 
 fn mesh(solid: &Solid, grid: &Grid) -> Mesh {
-    marching_cubes(&*solid.surface(*grid.bounds()), grid, &|_| {}).unwrap()
+    marching_cubes(&*solid.surface(*grid.bounds()), grid, &Unwatched).unwrap()
 }
 
 fn around(solid: &Solid, cells: usize) -> Grid {
@@ -59,7 +59,7 @@ fn sharp(name: &str, cells: usize) -> Quality {
         gradient: |p: DVec3| -solid.contact(p).normal,
     };
     let grid = Grid::filling(&DOMAIN, Resolution::Cells(cells)).unwrap();
-    let mesh = dual_contouring(&*field, &grid, &|_| {}).unwrap();
+    let mesh = dual_contouring(&*field, &grid, &Unwatched).unwrap();
     let report = check(&mesh, &*field);
     assert!(report.closed && report.manifold, "{name}, {cells} cells: {report:?}");
     measure(&mesh, &*field, &distance, &grid).unwrap()
@@ -125,7 +125,7 @@ fn walls_and_gaps_thinner_than_a_cell_are_counted_and_thick_ones_are_not() {
         let solid = solid(&format!("rfm 1\nsolid s = {text}"), "s");
         let domain = Aabb::new(DVec3::splat(-1.53), DVec3::splat(1.57));
         let grid = Grid::filling(&domain, Resolution::Cells(cells)).unwrap();
-        thin_cells(&*solid.surface(domain), &grid).unwrap().count
+        thin_cells(&*solid.surface(domain), &grid, &Unwatched).unwrap().count
     };
     assert_eq!(thin("sphere(1)", 40), 0);
     assert_eq!(thin("sphere(1) and -0.5 <= z <= 0.5", 40), 0);
@@ -135,6 +135,6 @@ fn walls_and_gaps_thinner_than_a_cell_are_counted_and_thick_ones_are_not() {
     assert_eq!(thin("sphere(1) or not sphere(1)", 40), 0, "a crack without width hides nothing");
     for name in ["pawn", "bishop"] {
         let solid = example(name);
-        assert_eq!(thin_cells(&solid.twin(), &around(&solid, 96)).unwrap().count, 0, "{name}");
+        assert_eq!(thin_cells(&solid.twin(), &around(&solid, 96), &Unwatched).unwrap().count, 0, "{name}");
     }
 }

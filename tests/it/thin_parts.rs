@@ -2,7 +2,7 @@
 //! counted.
 
 use rfm::glam::DVec3;
-use rfm::mesh::{Grid, Mesh, Resolution, ThinCells, marching_cubes, thin_cells};
+use rfm::mesh::{Grid, Mesh, Resolution, ThinCells, Unwatched, marching_cubes, thin_cells};
 use rfm::{Engine, Program, Solid};
 
 fn solid(text: &str) -> Solid {
@@ -13,7 +13,7 @@ fn solid(text: &str) -> Solid {
 fn looked_at(solid: &Solid, cells: usize) -> (Mesh, ThinCells) {
     let grid = Grid::around(&solid.bounds().aabb().unwrap(), Resolution::Cells(cells)).unwrap();
     let field = solid.surface(*grid.bounds());
-    (marching_cubes(&*field, &grid, &|_| {}).unwrap(), thin_cells(&*field, &grid).unwrap())
+    (marching_cubes(&*field, &grid, &Unwatched).unwrap(), thin_cells(&*field, &grid, &Unwatched).unwrap())
 }
 
 /// How often the mesh goes around a point, by the solid angles of its triangles (van Oosterom and Strackee,
@@ -26,6 +26,30 @@ fn turns(mesh: &Mesh, p: DVec3) -> f64 {
         2.0 * a.dot(b.cross(c)).atan2(below)
     };
     mesh.triangles.iter().map(angle).sum::<f64>() / (4.0 * std::f64::consts::PI)
+}
+
+#[test]
+fn tips_and_rims_of_what_the_grid_shows_are_told_from_thin_parts() {
+    // a tip between four faces, a rim of 23°, the horns of a crescent, a wedge of 11°, a cusp
+    for text in [
+        "abs(x)/2 + abs(y) + abs(z)/3 <= 1",
+        "sphere(5).move([0, 0, -4.9]) and sphere(5).move([0, 0, 4.9])",
+        "sphere(1) \\ sphere(1).move([0.2, 0, 0])",
+        "box([0, 0, 0], [1, 1, 1]) and 5*z <= x",
+        "4*(x^2 + y^2) <= (1 + z)*(1 - z)^3 and abs(z) <= 1",
+    ] {
+        let (_, thin) = looked_at(&solid(text), 96);
+        assert!(thin.count > 0 && thin.is_wedge && !thin.ended, "{text}: {thin:?}");
+    }
+    // half a ball and a plate on a ball, and a needle
+    for text in [
+        "sphere(1) or ball([1, 0, 0], 0.006)",
+        "sphere(1) or box([-0.3, -0.003, 0.9], [0.3, 0.003, 1.1])",
+        "cone(0.01, 3).rotate([1, 0.2, 0.3], 1.3) or sphere(0.3)",
+    ] {
+        let (_, thin) = looked_at(&solid(text), 96);
+        assert!(thin.count > 0 && !thin.is_wedge, "{text}: {thin:?}");
+    }
 }
 
 /// A small generator (Knuth's linear congruence).

@@ -7,7 +7,7 @@ use rfm::files::{Files, Reader, Unread};
 use rfm::geom::Aabb;
 use rfm::glam::{DVec3, Vec3};
 use rfm::lower::Options;
-use rfm::mesh::{Grid, Resolution, check, dual_contouring, marching_cubes};
+use rfm::mesh::{Grid, Resolution, Unwatched, check, dual_contouring, marching_cubes};
 use rfm::source::{self, Target};
 use rfm::{Engine, Program, Solid};
 
@@ -107,7 +107,7 @@ fn pawn(cells: usize) -> Soup {
     let path = format!("{}/examples/pawn.rfm", env!("CARGO_MANIFEST_DIR"));
     let solid = Program::from_path(path).unwrap().solid("pawn").unwrap();
     let grid = Grid::around(&solid.bounds().aabb().unwrap(), Resolution::Cells(cells)).unwrap();
-    let mesh = marching_cubes(&*solid.surface(*grid.bounds()), &grid, &|_| {}).unwrap();
+    let mesh = marching_cubes(&*solid.surface(*grid.bounds()), &grid, &Unwatched).unwrap();
     let corner = |i: u32| mesh.positions[i as usize].as_vec3().as_dvec3();
     mesh.triangles.iter().map(|t| t.map(corner)).collect()
 }
@@ -268,9 +268,10 @@ fn a_pawn_with_holes_has_a_closed_mesh() {
     );
     let grid = Grid::around(&bounds, Resolution::Cells(40)).unwrap();
     let field = solid.surface(*grid.bounds());
-    for mesh in
-        [marching_cubes(&*field, &grid, &|_| {}).unwrap(), dual_contouring(&*field, &grid, &|_| {}).unwrap()]
-    {
+    for mesh in [
+        marching_cubes(&*field, &grid, &Unwatched).unwrap(),
+        dual_contouring(&*field, &grid, &Unwatched).unwrap(),
+    ] {
         let report = check(&mesh, &*field);
         assert!(report.closed && report.manifold, "{report:?}");
         let off = mesh.positions.iter().filter(|&&p| solid.omega(p).abs() > 1e-7).count();
@@ -329,7 +330,7 @@ fn a_hundred_thousand_triangles_are_quick() {
     let path = format!("{}/examples/pawn.rfm", env!("CARGO_MANIFEST_DIR"));
     let solid = Program::from_path(path).unwrap().solid("pawn").unwrap();
     let grid = Grid::around(&solid.bounds().aabb().unwrap(), Resolution::Cells(180)).unwrap();
-    let mesh = marching_cubes(&*solid.surface(*grid.bounds()), &grid, &|_| {}).unwrap();
+    let mesh = marching_cubes(&*solid.surface(*grid.bounds()), &grid, &Unwatched).unwrap();
     let corner = |i: u32| mesh.positions[i as usize].as_vec3().as_dvec3();
     let soup: Soup = mesh.triangles.iter().map(|t| t.map(corner)).collect();
     let file = binary_stl(&soup);

@@ -11,6 +11,7 @@ use std::path::Path;
 use std::time::Instant;
 
 use super::args::{Mesh as Options, MeshMethod, Shared};
+use super::deadline::Deadline;
 use super::failure::{Failure, complain, note};
 use super::{choose, input, output, progress};
 use crate::cli::output::Shown;
@@ -19,8 +20,8 @@ use rfm::Solid;
 use rfm::field::Field;
 use rfm::geom::{Aabb, to_thousandths};
 use rfm::mesh::{
-    self, Grid, GridError, LengthUnit, Mesh, MeshError, Quality, Reference, Resolution, ThinCells, WriteMesh,
-    dual_contouring, marching_cubes,
+    self, Grid, GridError, LengthUnit, Mesh, MeshError, Quality, Reference, Resolution, ThinCells, Watch,
+    WriteMesh, dual_contouring, marching_cubes,
 };
 use rfm::solid::{Bounds, Depth};
 use rfm::view;
@@ -38,15 +39,10 @@ impl MeshMethod {
     }
 
     /// Meshes a field by this method.
-    pub fn mesh(
-        self,
-        field: &dyn Field,
-        grid: &Grid,
-        progress: &(dyn Fn(f64) + Sync),
-    ) -> Result<Mesh, MeshError> {
+    pub fn mesh(self, field: &dyn Field, grid: &Grid, watch: &dyn Watch) -> Result<Mesh, MeshError> {
         match self {
-            Self::Mc => marching_cubes(field, grid, progress),
-            Self::Dc => dual_contouring(field, grid, progress),
+            Self::Mc => marching_cubes(field, grid, watch),
+            Self::Dc => dual_contouring(field, grid, watch),
         }
     }
 }
@@ -81,12 +77,12 @@ pub(super) fn run(shared: &Shared, options: &Options) -> Result<(), Failure> {
     let report = mesh::check(&mesh, &*surface);
     let thin = match &grid {
         None => ThinCells::NONE,
-        Some(grid) => mesh::thin_cells(&*surface, grid).map_err(Failure::usage)?,
+        Some(grid) => thin_cells(&*surface, grid, options, times.meshing)?,
     };
     times.checking = milliseconds(started);
     remark(&solid, &mesh, (&thin, grid.as_ref()), options);
     if mesh.triangles.is_empty() {
-        return nothing_to_write(shared, options, (&solid, &report, thin.count, &times));
+        return nothing_to_write(shared, options, (&solid, &report, &thin, &times));
     }
     if let (Some(path), Some(writer)) = (&options.output, writer) {
         let started = Instant::now();
@@ -98,7 +94,7 @@ pub(super) fn run(shared: &Shared, options: &Options) -> Result<(), Failure> {
         warn_of_rounding(path, &mesh, grid.as_ref());
     }
     let names = (solid.name(), options.method.name());
-    let summary = MeshSummary::new(names, &report, thin.count, quality, simplified.as_ref(), times);
+    let summary = MeshSummary::new(names, &report, &thin, quality, simplified.as_ref(), times);
     if shared.json {
         return output::json(&summary);
     }
@@ -109,15 +105,30 @@ pub(super) fn run(shared: &Shared, options: &Options) -> Result<(), Failure> {
     Ok(())
 }
 
+/// Time for the search for thin parts, unless the option states it: so many seconds, or so many times that of meshing.
+pub(super) const LEAST_SEARCH: f64 = 10.0;
+const SEARCH_PER_MESHING: f64 = 3.0;
+
+/// What the mesh misses. `meshing` is how long it took, ms.
+fn thin_cells(
+    surface: &dyn Field,
+    grid: &Grid,
+    options: &Options,
+    meshing: f64,
+) -> Result<ThinCells, Failure> {
+    let own = LEAST_SEARCH.max(SEARCH_PER_MESHING * 1e-3 * meshing);
+    mesh::thin_cells(surface, grid, &Deadline::after(options.budget.unwrap_or(own))).map_err(Failure::usage)
+}
+
 /// Ends the command for a mesh without triangles: there is no file of it.
 fn nothing_to_write(
     shared: &Shared,
     options: &Options,
-    (solid, report, thin_cells, times): (&Solid, &mesh::Report, usize, &Times),
+    (solid, report, thin, times): (&Solid, &mesh::Report, &ThinCells, &Times),
 ) -> Result<(), Failure> {
     if shared.json {
         let names = (solid.name(), options.method.name());
-        output::json(&MeshSummary::new(names, report, thin_cells, None, None, *times))?;
+        output::json(&MeshSummary::new(names, report, thin, None, None, *times))?;
     }
     if let Some(path) = &options.output {
         complain(&format!("the mesh is empty: `{}` is not written", path.shown()));
@@ -237,7 +248,7 @@ pub(super) fn no_grid(error: &GridError, flag: &str, cells: usize) -> Failure {
 /// The mesh of a surface, without slivers if that is asked for.
 fn meshed(solid: &Solid, surface: &dyn Field, grid: &Grid, options: &Options) -> Result<Mesh, Failure> {
     let bar = progress::bar(1000, "meshing");
-    let mesh = options.method.mesh(surface, grid, &|part| bar.set_position((1000.0 * part) as u64));
+    let mesh = options.method.mesh(surface, grid, &|part: f64| bar.set_position((1000.0 * part) as u64));
     bar.finish_and_clear();
     let mut mesh =
         mesh.map_err(|error| Failure::usage(format!("cannot mesh `{}`: {error}", solid.name())))?;
@@ -299,11 +310,17 @@ pub(super) fn hidden(thin: &ThinCells, grid: &Grid) -> String {
 fn remark(solid: &Solid, mesh: &Mesh, (thin, grid): (&ThinCells, Option<&Grid>), options: &Options) {
     if let Some(grid) = grid.filter(|_| thin.count > 0) {
         let what = if thin.is_wedge {
-            "the mesh shows sharp edges blunt"
+            "the mesh shows sharp edges and tips blunt"
         } else {
             "the mesh misses what is thinner than a cell"
         };
         note(format!("{what} {}", hidden(thin, grid)));
+    }
+    if thin.ended {
+        note(
+            "the search for what the mesh misses was ended before all of the surface was looked at; --budget gives \
+             it more time",
+        );
     }
     if mesh.triangles.is_empty() {
         note(format!("`{}` has no surface here: {}", solid.name(), why_empty(solid, options)));

@@ -4,7 +4,7 @@ use serde::Serialize;
 
 use super::super::output::significant;
 use super::simplified::Simplified;
-use rfm::mesh::{Quality, Report};
+use rfm::mesh::{Quality, Report, ThinCells};
 
 /// Where the time of a mesh went, in milliseconds.
 #[derive(Debug, Clone, Copy, Default)]
@@ -38,7 +38,8 @@ pub(super) struct MeshSummary {
     area: f64,
     max_distance: f64,
     rms_distance: f64,
-    thin_cells: usize,
+    /// `None` where the search for them was ended.
+    thin_cells: Option<usize>,
     evaluations: u64,
     /// The time of the whole: to mesh, to simplify and measure, to check, and to write.
     milliseconds: f64,
@@ -85,12 +86,11 @@ impl From<&Simplified> for SimplifiedFigures {
 }
 
 impl MeshSummary {
-    /// The figures of a mesh that `method` made, with `thin_cells` cells that hide
-    /// a surface.
+    /// The figures of a mesh that `method` made, which misses what is thin.
     pub fn new(
         (solid, method): (&str, &'static str),
         report: &Report,
-        thin_cells: usize,
+        thin: &ThinCells,
         quality: Option<Quality>,
         simplified: Option<&Simplified>,
         times: Times,
@@ -109,7 +109,7 @@ impl MeshSummary {
             area: report.area,
             max_distance: report.max_distance,
             rms_distance: report.rms_distance,
-            thin_cells,
+            thin_cells: (!thin.ended).then_some(thin.count),
             evaluations: report.evaluations,
             milliseconds: times.total(),
             meshing_milliseconds: times.meshing,

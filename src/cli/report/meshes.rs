@@ -14,7 +14,7 @@ use super::super::plot::{self, Labels, Legend, LogAxis};
 use super::super::progress;
 use super::table::{self, Column};
 use rfm::Solid;
-use rfm::mesh::{self, Grid, Quality, Resolution};
+use rfm::mesh::{self, Grid, Quality, Resolution, Unwatched};
 use rfm::solid::Depth;
 
 /// Resolutions for each method. Each is twice as fine as the one before.
@@ -96,7 +96,7 @@ fn row(solid: &Solid, method: MeshMethod, cells: usize, grid: &Grid) -> Result<M
     let mut mesh = mesh::Mesh::default();
     for _ in 0..REPETITIONS {
         let started = Instant::now();
-        mesh = method.mesh(&*surface, grid, &|_| ()).map_err(Failure::usage)?;
+        mesh = method.mesh(&*surface, grid, &Unwatched).map_err(Failure::usage)?;
         fastest = fastest.min(started.elapsed().as_secs_f64() * 1e3);
     }
     let report = mesh::check(&mesh, &*surface);

@@ -4,10 +4,11 @@
 use std::sync::OnceLock;
 
 use super::super::args::Run;
-use super::super::mesh::{hidden, no_grid};
+use super::super::deadline::Deadline;
+use super::super::mesh::{LEAST_SEARCH, hidden, no_grid};
 use super::super::{Failure, note};
 use rfm::geom::{Aabb, Placement};
-use rfm::mesh::{self, Grid, Mesh, Resolution, dual_contouring};
+use rfm::mesh::{self, Grid, Mesh, Resolution, Unwatched, dual_contouring};
 use rfm::{Experiment, Solid};
 
 /// The solids of a scene.
@@ -53,12 +54,17 @@ impl Bodies {
             let name = solid.name();
             let grid = self.grid(solid)?;
             let surface = solid.surface(*grid.bounds());
-            let thin = mesh::thin_cells(&*surface, &grid).map_err(Failure::usage)?;
+            let thin =
+                mesh::thin_cells(&*surface, &grid, &Deadline::after(LEAST_SEARCH)).map_err(Failure::usage)?;
             if thin.count > 0 {
                 note(format!(
                     "the fluid meets all of the obstacle `{name}`, but its mesh and its pictures miss what is thinner than a \
                      cell {}; --mesh-cells sets how many there are",
                     hidden(&thin, &grid)
+                ));
+            } else if thin.ended {
+                note(format!(
+                    "whether the mesh of the obstacle `{name}` misses what is thin was not found out in time"
                 ));
             } else if mesh.triangles.is_empty() {
                 note(format!("the obstacle `{name}` has no surface in the box"));
@@ -70,9 +76,9 @@ impl Bodies {
     /// The mesh of each solid at a time, s, cut off at the box.
     pub fn meshes_at(&self, time: f64) -> Result<Vec<Mesh>, Failure> {
         let mesh_at = |(number, solid): (usize, &Solid)| {
-            // the mesh of what stands still is not kept
+            // where nothing moves, meshes are made once
             let carried = || Some((self.placement(number, time)?, self.at_start(number)?));
-            match if solid.moves() { carried() } else { None } {
+            match if self.move_about() { carried() } else { None } {
                 Some((placement, mesh)) => Ok(mesh.moved(&placement)),
                 None => self.mesh_of(&solid.at(time)),
             }
@@ -122,7 +128,7 @@ impl Bodies {
     fn mesh_of(&self, solid: &Solid) -> Result<Mesh, Failure> {
         let grid = self.grid(solid)?;
         let surface = solid.surface(*grid.bounds());
-        dual_contouring(&*surface, &grid, &|_| {}).map_err(Failure::usage)
+        dual_contouring(&*surface, &grid, &Unwatched).map_err(Failure::usage)
     }
 
     fn grid(&self, solid: &Solid) -> Result<Grid, Failure> {

@@ -24,10 +24,15 @@ use crate::geom::Aabb;
 /// How often folded triangles are looked for and mended.
 const REPAIRS: usize = 4;
 
-/// Evaluations for mending, as a share of those that found the surface, which were made many at a time, and
-/// the fewest.
+/// Evaluations for mending where triangles are not to cross, as a share of those that found the surface, which were made
+/// many at a time, and the fewest.
 const MENDING: f64 = 0.25;
 const LEAST_MENDING: u64 = 20_000;
+
+/// The same where nothing crosses. The examples need up to four times as many as found the surface; a mesh of a surface
+/// with details everywhere would never be done.
+const SHARP_MENDING: f64 = 8.0;
+const LEAST_SHARP_MENDING: u64 = 200_000;
 
 /// Rounds of moving cuts back, at most. The last one moves all back.
 const UNDOINGS: usize = 16;
@@ -244,10 +249,11 @@ impl<'a> Draft<'a> {
     /// # Errors
     /// [`MeshError::TooManyVertices`] if refining and mending made too many.
     pub fn mend(&mut self, far: Vec<[u32; 2]>) -> Result<bool, MeshError> {
-        let mut budget = match self.care {
-            Care::Sharp => u64::MAX,
-            Care::Apart => ((MENDING * self.work.evaluations as f64) as u64).max(LEAST_MENDING),
+        let (share, least) = match self.care {
+            Care::Sharp => (SHARP_MENDING, LEAST_SHARP_MENDING),
+            Care::Apart => (MENDING, LEAST_MENDING),
         };
+        let mut budget = ((share * self.work.evaluations as f64) as u64).max(least);
         let merged = self.work.merged;
         let mut changes = mend::is_worth(&far, &self.triangles);
         if changes {

@@ -48,7 +48,7 @@ use self::quads::{Cut, Quads};
 use self::secure::Surface;
 use self::vertices::{Hits, Rings, Vertices};
 use super::{
-    Grid, Mesh, MeshError, Work,
+    Grid, Mesh, MeshError, Watch, Work,
     crossings::{self, BRICKS_PER_TASK, Crossed, EdgeScratch, OnEdges, ProgressPart},
     normals::GradientColumns,
     prune::{Bricks, Lattice},
@@ -60,29 +60,26 @@ use crate::field::Field;
 /// lies inside.
 ///
 /// Inside is strictly ω > 0. Everything outside the grid counts as outside, so a solid cut by the border is
-/// closed by faces on it (see [`Mesh::caps`]). `progress` is called from any thread with the share of the
-/// surface found, in (0, 1], not always in ascending order. Sources: Ju, Losasso, Schaefer, Warren, SIGGRAPH
+/// closed by faces on it (see [`Mesh::caps`]). `watch` is told the share of the
+/// surface found, and may end the work. Sources: Ju, Losasso, Schaefer, Warren, SIGGRAPH
 /// 2002; Schaefer, Ju, Warren, IEEE TVCG 13, 2007.
 ///
 /// # Errors
 /// [`MeshError::NotANumber`] if ω is NaN at a node or on an edge that crosses the surface,
-/// [`MeshError::TooManyVertices`] beyond [`Mesh::MAX_VERTICES`].
-pub fn dual_contouring(
-    field: &dyn Field,
-    grid: &Grid,
-    progress: &(dyn Fn(f64) + Sync),
-) -> Result<Mesh, MeshError> {
+/// [`MeshError::TooManyVertices`] beyond [`Mesh::MAX_VERTICES`], [`MeshError::Ended`] if `watch` ends the work.
+pub fn dual_contouring(field: &dyn Field, grid: &Grid, watch: &dyn Watch) -> Result<Mesh, MeshError> {
     let lattice = Lattice::new(grid);
     let near = Bricks::classify(field, &lattice);
     let mut work = Work::default();
 
-    let crossing = Crossing::find(field, &lattice, &near, progress, &mut work)?;
+    let crossing = Crossing::find(field, &lattice, &near, watch, &mut work)?;
     let rings = Rings::new(crossing.crossed.vertices);
     let placed_and_joined = |work: &mut Work| {
         let (vertices, placed) = place(&crossing.placement(field, &lattice, &rings, grid.spacing()));
         join((field, &lattice), &crossing, &rings, &placed, vertices, grid, work)
     };
     let mut joined = placed_and_joined(&mut work);
+    crossings::ended(watch)?;
     let crossings = joined.crossings();
     let is_clear = crossings.is_empty();
     let mut kept = None;
@@ -96,21 +93,22 @@ pub fn dual_contouring(
             kept = Some(joined);
             triangles
         };
-        match Attempt::make(Draft::new(field, grid, triangles, work), is_clear)? {
+        match Attempt::make(Draft::new(field, grid, triangles, work), is_clear, watch)? {
             Attempt::Clear(mesh) => return Ok(mesh),
             // without the cuts nothing crosses
             Attempt::Crossing { cut: Some((mut draft, far)), work: spent } => {
                 draft.count(spent);
-                return apart(draft, far);
+                return apart(draft, far, watch);
             }
             Attempt::Crossing { cut: None, work: spent } => work = spent,
         }
     }
     let joined = kept.unwrap_or_else(|| placed_and_joined(&mut work));
+    crossings::ended(watch)?;
     let triangles = joined.triangles_apart(crossings, &mut work);
     let mut draft = Draft::new(field, grid, triangles, work);
     let far = draft.cut();
-    apart(draft, far)
+    apart(draft, far, watch)
 }
 
 /// A mesh made sharp without care for triangles that cross.
@@ -130,8 +128,8 @@ impl<'a> Attempt<'a> {
     /// Cuts edges, and mends what can be mended. A mesh is clear if nothing crosses before.
     ///
     /// # Errors
-    /// Those of [`Draft::mend`].
-    fn make(mut draft: Draft<'a>, is_clear: bool) -> Result<Self, MeshError> {
+    /// Those of [`Draft::mend`], and [`MeshError::Ended`].
+    fn make(mut draft: Draft<'a>, is_clear: bool, watch: &dyn Watch) -> Result<Self, MeshError> {
         let far = draft.cut();
         let is_long = far.len() > draft.triangle_count() / CHECKED;
         let may_cross = draft.is_cut() || !is_clear;
@@ -141,7 +139,9 @@ impl<'a> Attempt<'a> {
             return Ok(Self::Crossing { cut: is_clear.then_some((draft, far)), work });
         }
         let cut = (crossing > 0 && is_clear).then(|| (draft.clone(), far.clone()));
+        crossings::ended(watch)?;
         let changes = draft.mend(far)?;
+        crossings::ended(watch)?;
         let is_known = is_clear && !changes && !draft.is_cut();
         if is_known || draft.crossings() == 0 {
             return Ok(Self::Clear(draft.finish()));
@@ -153,9 +153,11 @@ impl<'a> Attempt<'a> {
 /// The mesh without triangles that cross.
 ///
 /// # Errors
-/// Those of [`Draft::mend`].
-fn apart(mut draft: Draft<'_>, far: Vec<[u32; 2]>) -> Result<Mesh, MeshError> {
+/// Those of [`Draft::mend`], and [`MeshError::Ended`].
+fn apart(mut draft: Draft<'_>, far: Vec<[u32; 2]>, watch: &dyn Watch) -> Result<Mesh, MeshError> {
+    crossings::ended(watch)?;
     draft.part();
+    crossings::ended(watch)?;
     draft.mend(far)?;
     Ok(draft.finish())
 }
@@ -196,16 +198,16 @@ impl Crossing {
         field: &dyn Field,
         lattice: &Lattice,
         near: &Bricks,
-        progress: &(dyn Fn(f64) + Sync),
+        watch: &dyn Watch,
         work: &mut Work,
     ) -> Result<Self, MeshError> {
-        let sampling = ProgressPart::new(near.near.len().div_ceil(BRICKS_PER_TASK), 0.0..0.5, progress);
-        let signs = crossings::sample(field, lattice, near, &mut work.evaluations, &|| sampling.advance())?;
+        let sampling = ProgressPart::new(near.near.len().div_ceil(BRICKS_PER_TASK), 0.0..0.5, watch);
+        let signs = crossings::sample(field, lattice, near, &mut work.evaluations, &sampling)?;
         let crossed =
             Crossed::number(near, &signs, |brick, around| Sheets::find(field, lattice, brick.low, around));
         let sheets: usize = sheet_counts(&crossed).sum();
         MeshError::check_vertices(sheets.max(crossed.vertices))?;
-        let hitting = ProgressPart::new(crossed.tasks.len(), 0.5..1.0, progress);
+        let hitting = ProgressPart::new(crossed.tasks.len(), 0.5..1.0, watch);
         let hits = hits(field, lattice, &crossed, work, &hitting)?;
         Ok(Self { signs, crossed, hits })
     }
@@ -248,13 +250,14 @@ fn hits(
         .map_init(
             || (EdgeScratch::default(), GradientColumns::default()),
             |(edges, gradients), ((task, positions), normals)| {
-                let found = task.place_on_edges(field, lattice, positions, edges)?;
-                gradients.normals(field, positions, normals);
-                for cap in &found.caps {
-                    normals[cap.vertex as usize - task.first] = cap.outward;
-                }
-                stage.advance();
-                Ok(found)
+                stage.run(|| {
+                    let found = task.place_on_edges(field, lattice, positions, edges)?;
+                    gradients.normals(field, positions, normals);
+                    for cap in &found.caps {
+                        normals[cap.vertex as usize - task.first] = cap.outward;
+                    }
+                    Ok(found)
+                })
             },
         )
         .collect();

@@ -10,10 +10,11 @@ use super::super::{Grid, Mesh, Report, Resolution, check};
 use super::dual_contouring;
 use crate::field::{Closures, Field};
 use crate::geom::Aabb;
+use crate::mesh::Unwatched;
 
 #[track_caller]
 fn check_in(field: &dyn Field, grid: &Grid) -> (Mesh, Report) {
-    let mesh = dual_contouring(field, grid, &|_| ()).unwrap();
+    let mesh = dual_contouring(field, grid, &Unwatched).unwrap();
     let report = check(&mesh, field);
     assert!(report.closed && report.manifold, "{report:?}");
     assert!(mesh.normals.iter().all(|n| (n.length() - 1.0).abs() < 1e-12), "normals must be unit vectors");
@@ -184,11 +185,11 @@ fn nan_and_useless_gradients() {
     let field = Formula(|p: DVec3| if p.x > 0.4 { f64::NAN } else { 0.3 - p.length() });
     let grid = Grid::around(&cube(1.0), Resolution::Cells(16)).unwrap();
     assert!(
-        matches!(dual_contouring(&field, &grid, &|_| ()), Err(super::MeshError::NotANumber { at }) if at.x > 0.4)
+        matches!(dual_contouring(&field, &grid, &Unwatched), Err(super::MeshError::NotANumber { at }) if at.x > 0.4)
     );
     for bad in [DVec3::NAN, DVec3::ZERO] {
         let field = Closures { omega: ball(DVec3::ZERO, 1.0), gradient: move |_| bad };
-        let mesh = dual_contouring(&field, &grid, &|_| ()).unwrap();
+        let mesh = dual_contouring(&field, &grid, &Unwatched).unwrap();
         assert!(mesh.positions.iter().zip(&mesh.normals).all(|(p, n)| n.dot(*p) > 0.8));
     }
 }

@@ -124,6 +124,7 @@ mod tests {
     use super::*;
     use crate::field::Closures;
     use crate::geom::Aabb;
+    use crate::mesh::Unwatched;
     use crate::mesh::{Grid, Resolution, dual_contouring};
 
     fn meshed(
@@ -132,7 +133,7 @@ mod tests {
     ) -> Mesh {
         let grid =
             Grid::around(&Aabb::new(DVec3::splat(-0.6), DVec3::splat(0.61)), Resolution::Cells(24)).unwrap();
-        dual_contouring(&Closures { omega, gradient }, &grid, &|_| {}).unwrap()
+        dual_contouring(&Closures { omega, gradient }, &grid, &Unwatched).unwrap()
     }
 
     #[test]

@@ -3,8 +3,9 @@
 use super::*;
 use crate::field::Closures;
 use crate::mesh::{Grid, Quality, Report, Resolution, check, dual_contouring, marching_cubes, measure};
+use crate::mesh::{Unwatched, Watch};
 
-type Mesher = fn(&dyn Field, &Grid, &(dyn Fn(f64) + Sync)) -> Result<Mesh, crate::mesh::MeshError>;
+type Mesher = fn(&dyn Field, &Grid, &dyn Watch) -> Result<Mesh, crate::mesh::MeshError>;
 
 /// Simplifies a mesh in [−1, 1]³. Returns the findings before and after, and the measured quality and the
 /// mesh after.
@@ -16,7 +17,7 @@ fn simplified(
 ) -> (Report, Report, Quality, Mesh) {
     let grid = Grid::filling(&Aabb::new(DVec3::splat(-1.0), DVec3::splat(1.0)), Resolution::Cells(cells));
     let grid = grid.unwrap();
-    let mut mesh = mesher(field, &grid, &|_| ()).unwrap();
+    let mut mesh = mesher(field, &grid, &Unwatched).unwrap();
     let before = check(&mesh, field);
     let taken = simplify(&mut mesh, field, tolerance);
     let after = check(&mesh, field);
@@ -104,7 +105,7 @@ fn caps_stay_where_they_are() {
 fn no_tolerance_changes_nothing_and_the_same_mesh_gives_the_same_bits() {
     let grid =
         Grid::filling(&Aabb::new(DVec3::splat(-1.0), DVec3::splat(1.0)), Resolution::Cells(24)).unwrap();
-    let mesh = marching_cubes(&ball(), &grid, &|_| ()).unwrap();
+    let mesh = marching_cubes(&ball(), &grid, &Unwatched).unwrap();
     for tolerance in [0.0, -1.0, f64::NAN] {
         let mut same = mesh.clone();
         assert_eq!(simplify(&mut same, &ball(), tolerance), 0);

@@ -19,8 +19,11 @@ pub struct ThinCells {
     pub at: DVec3,
     /// Whether a gap is that thin, rather than a part of the solid.
     pub is_gap: bool,
-    /// Whether all of them are edges of wedges whose faces the grid shows nearby. No grid shows all of such an edge.
+    /// Whether all of them are edges, tips and rims of what grows to something that the grid shows. No grid shows all of
+    /// such an edge.
     pub is_wedge: bool,
+    /// Whether the search was ended before all cells were looked into.
+    pub ended: bool,
 }
 
 impl ThinCells {
@@ -32,7 +35,11 @@ impl ThinCells {
         at: DVec3::ZERO,
         is_gap: false,
         is_wedge: false,
+        ended: false,
     };
+
+    /// The result for cells that were not looked into.
+    pub(super) const ENDED: Self = Self { ended: true, ..Self::NONE };
 
     /// The number of cells along the longest side of a grid with which what hides would be two cells thick.
     /// `None` if nothing hides but wedges, its thickness is not known, or no grid can be so fine.
@@ -49,6 +56,6 @@ impl ThinCells {
         let is_other = other.count > 0 && (self.count == 0 || before(&other, &self));
         let thinner = if is_other { other } else { self };
         let (count, bounds) = (self.count + other.count, self.bounds.union(&other.bounds));
-        Self { count, bounds, ..thinner }
+        Self { count, bounds, ended: self.ended || other.ended, ..thinner }
     }
 }

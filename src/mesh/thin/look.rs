@@ -40,6 +40,24 @@ const ON_FACE: f64 = 1e-8;
 /// of ten degrees or more.
 const WALL: f64 = 0.985;
 
+/// Faces that agree more than this (cosine) with each other's backs, at four degrees or less, are those of no wedge.
+const NARROWEST: f64 = 0.998;
+
+/// A wedge is followed so many times as far as plane faces need to be two cells thick, in so many steps.
+const FARTHER: f64 = 2.0;
+const STEPS_ALONG: u32 = 32;
+
+/// From step to step it grows at most so many times, counted from so thick in cells.
+const GROWTH: f64 = 2.0;
+const GROWTH_OF_CELL: f64 = 0.5;
+
+/// Steps to its faces, and bisections of the last one.
+const STEPS_TO_END: usize = 16;
+const HALVED_TO_END: usize = 8;
+
+/// Along faces that agree more than this (cosine) with a face, or with its back, there is no other way across.
+const PARALLEL_TO_OWN: f64 = 0.9999;
+
 /// A face that agrees more than this (cosine) with the way to it ends a thickness.
 const BACK: f64 = 0.5;
 
@@ -136,10 +154,12 @@ struct Across {
     thickness: f64,
     /// The outward unit normal of the face there.
     normal: DVec3,
+    /// The unit vector towards it.
+    way: DVec3,
 }
 
 impl Across {
-    const FAR: Self = Self { thickness: f64::INFINITY, normal: DVec3::ZERO };
+    const FAR: Self = Self { thickness: f64::INFINITY, normal: DVec3::ZERO, way: DVec3::ZERO };
 }
 
 impl Look<'_> {
@@ -314,7 +334,8 @@ impl Look<'_> {
     /// knows other faces nearby, and what the face belongs to is thicker than two cells.
     fn counted(&self, foot: Foot, seen: &Seen) -> ThinCells {
         // across the face, and along the faces beside it: a bump on a wall is as thin as it is wide
-        let beside = seen.around.iter().filter_map(|n| unit(foot.normal - n.dot(foot.normal) * *n));
+        let others = seen.around.iter().filter(|n| n.dot(foot.normal).abs() < PARALLEL_TO_OWN);
+        let beside = others.filter_map(|n| unit(foot.normal - n.dot(foot.normal) * *n));
         let ways = || std::iter::once(foot.normal).chain(beside.clone());
         let least = |inside: bool| {
             let sign = if inside { -1.0 } else { 1.0 };
@@ -323,15 +344,75 @@ impl Look<'_> {
         };
         let (wall, gap) = (least(true), least(false));
         let is_gap = gap.thickness < wall.thickness;
-        let Across { thickness, normal } = if is_gap { gap } else { wall };
+        let Across { thickness, normal, .. } = if is_gap { gap } else { wall };
         if thickness == f64::INFINITY && !seen.around.is_empty() {
             return ThinCells::NONE; // a step or an edge of something thick
         }
         // the edge of something that the grid knows: both faces are seen nearby, and meet at an angle
         let straight = self.across(foot.at, if is_gap { 1.0 } else { -1.0 } * foot.normal, !is_gap);
         let is_known = is_known(foot.normal, &seen.around) && is_known(normal, &seen.around);
-        let is_wedge = thickness == straight.thickness && is_known && normal.dot(foot.normal).abs() < WALL;
-        ThinCells { count: 1, bounds: self.bounds, thickness, at: foot.at, is_gap, is_wedge }
+        let is_wedge = (thickness == straight.thickness && is_known && normal.dot(foot.normal).abs() < WALL)
+            || (thickness.is_finite() && self.opens(&foot, if is_gap { &gap } else { &wall }, is_gap))
+            || (straight.thickness.is_finite() && self.opens(&foot, &straight, is_gap));
+        ThinCells { count: 1, bounds: self.bounds, thickness, at: foot.at, is_gap, is_wedge, ended: false }
+    }
+
+    /// Whether a part, or a gap, is the edge or the tip of something that the grid shows: between the faces that meet there it
+    /// grows to the thickness of two cells, and no other face comes in between.
+    fn opens(&self, foot: &Foot, opposite: &Across, is_gap: bool) -> bool {
+        let outwards = if is_gap { 1.0 } else { -1.0 };
+        let faces = [foot.normal, opposite.normal];
+        let cosine = -faces[0].dot(faces[1]);
+        let (Some(along), Some(across)) = (unit(outwards * (faces[0] + faces[1])), unit(faces[0] - faces[1]))
+        else {
+            return false; // a wall
+        };
+        if cosine >= NARROWEST {
+            return false;
+        }
+        let cell = self.bounds.size().max_element();
+        // as far as plane faces at this angle are that thick, and as far again for curved ones
+        let farthest = FARTHER * 0.5 * THICKEST * cell * ((1.0 + cosine) / (1.0 - cosine)).sqrt();
+        let mut p = foot.at + 0.5 * opposite.thickness * opposite.way;
+        let mut thickness = opposite.thickness;
+        for _ in 0..STEPS_ALONG {
+            p += along * (farthest / f64::from(STEPS_ALONG));
+            // faces look away from a part and into a gap
+            let ways = [-outwards * across, outwards * across];
+            let ends = [0, 1].map(|side: usize| self.end(p, ways[side], faces[side], is_gap));
+            let [Some(first), Some(second)] = ends else { return false };
+            let grown = first + second;
+            if grown > GROWTH * thickness.max(GROWTH_OF_CELL * cell) {
+                return false; // a bump ends, and what it sits on begins
+            }
+            if grown >= THICKEST * cell {
+                return true;
+            }
+            thickness = grown;
+            p += 0.5 * (first - second) * ways[0];
+        }
+        false
+    }
+
+    /// How far a point in a part or in a gap is from a face in one direction, at most two cells. `None` if the point does not
+    /// lie there, or another face ends it.
+    fn end(&self, from: DVec3, way: DVec3, face: DVec3, is_gap: bool) -> Option<f64> {
+        let is_within = |p: DVec3| (self.omega(p) > 0.0) != is_gap;
+        if !is_within(from) {
+            return None;
+        }
+        let step = THICKEST * self.bounds.size().max_element() / STEPS_TO_END as f64;
+        let Some(mut far) = (1..=STEPS_TO_END).map(|i| step * i as f64).find(|t| !is_within(from + *t * way))
+        else {
+            return Some(step * STEPS_TO_END as f64);
+        };
+        let mut near = far - step;
+        for _ in 0..HALVED_TO_END {
+            let middle = 0.5 * (near + far);
+            if is_within(from + middle * way) { near = middle } else { far = middle }
+        }
+        let normal = unit(-self.field.omega_grad(from + far * way).1)?;
+        (normal.dot(face) > KNOWN).then_some(far)
     }
 
     /// The way from a point of the surface to where it is met again from inside, or from outside, if the face there turns its
@@ -349,7 +430,7 @@ impl Look<'_> {
         let towards = if inside { way } else { -way };
         let end = unit(-self.field.omega_grad(from + far * way).1);
         match end.filter(|normal| normal.dot(towards) > BACK) {
-            Some(normal) => Across { thickness: far, normal },
+            Some(normal) => Across { thickness: far, normal, way },
             None => Across::FAR,
         }
     }

@@ -18,7 +18,8 @@ use nalgebra::{Matrix4, Vector3};
 use rfm::geom::Aabb;
 use rfm::glam::DVec3;
 use rfm::mesh::{
-    Grid, Mesh, Quality, Reference, Resolution, dual_contouring, is_closed_manifold, marching_cubes, shells,
+    Grid, Mesh, Quality, Reference, Resolution, Unwatched, dual_contouring, is_closed_manifold,
+    marching_cubes, shells,
 };
 use rfm::solid::Depth;
 use rfm::{Engine, Program};
@@ -123,7 +124,7 @@ fn measure(scene: &Scene, cells: usize) {
             // The work includes what is prepared for the box (programs, cell map).
             let surface = solid.surface(bounds);
             let mesher = if dual { dual_contouring } else { marching_cubes };
-            mesher(&*surface, here, &|_| ()).unwrap_or_else(|e| panic!("{e}"))
+            mesher(&*surface, here, &Unwatched).unwrap_or_else(|e| panic!("{e}"))
         }
     };
     let mut rows = vec![

@@ -26,8 +26,8 @@ pub type Mesher = fn(&dyn Field, &Grid, &Watch) -> Result<Mesh, MeshError>;
 /// The method of a name.
 pub fn mesher(method: &str) -> PyResult<Mesher> {
     match method {
-        "mc" => Ok(|field, grid, watch| marching_cubes(field, grid, &|_| watch.look())),
-        "dc" => Ok(|field, grid, watch| dual_contouring(field, grid, &|_| watch.look())),
+        "mc" => Ok(|field, grid, watch| marching_cubes(field, grid, watch)),
+        "dc" => Ok(|field, grid, watch| dual_contouring(field, grid, watch)),
         _ => Err(PyValueError::new_err(format!("method is {method:?}, expected 'mc' or 'dc'"))),
     }
 }
@@ -36,14 +36,14 @@ pub fn mesher(method: &str) -> PyResult<Mesher> {
 ///
 /// # Errors
 /// `RfmError` if no box around the solid is known, or if it cannot be meshed.
-pub fn volume(solid: &Solid, cells: usize) -> PyResult<f64> {
+pub fn volume(solid: &Solid, cells: usize, watch: &Watch) -> PyResult<f64> {
     let bounds = match solid.bounds() {
         Bounds::Within(bounds) => bounds,
         Bounds::Empty => return Ok(0.0),
         Bounds::Unbounded => return Err(refused(unbounded(solid))),
     };
     let surface = solid.surface(bounds.grown(0.1 * bounds.size().max_element()));
-    mesh::volume(&*surface, bounds, cells).map(|found| found.volume).map_err(refused)
+    mesh::volume(&*surface, bounds, cells, watch).map(|found| found.volume).map_err(refused)
 }
 
 fn unbounded(solid: &Solid) -> String {
@@ -101,9 +101,9 @@ impl PyMesh {
             return Ok(*count);
         }
         let Some(made_of) = self.made_of.clone() else { return Ok(0) };
-        let found = run_watched(py, Threads::Auto, move |_| {
+        let found = run_watched(py, Threads::Auto, move |watch| {
             let (solid, grid) = &*made_of;
-            mesh::thin_cells(&*solid.surface(*grid.bounds()), grid)
+            mesh::thin_cells(&*solid.surface(*grid.bounds()), grid, watch)
         })?
         .map_err(refused)?;
         Ok(*self.thin_cells.get_or_init(|| found.count))

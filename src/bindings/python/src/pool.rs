@@ -108,12 +108,10 @@ pub fn run<R: Send>(py: Python<'_>, threads: Threads, work: impl FnOnce() -> R +
 #[derive(Clone, Default)]
 pub struct Watch(Arc<AtomicBool>);
 
-impl Watch {
-    /// Ends the work if Ctrl-C has been pressed; nobody waits for its result then.
-    pub fn look(&self) {
-        if self.0.load(Ordering::Relaxed) {
-            resume_unwind(Box::new("Ctrl-C"));
-        }
+impl rfm::mesh::Watch for Watch {
+    /// Nobody waits for the result of what Ctrl-C has ended.
+    fn is_over(&self) -> bool {
+        self.0.load(Ordering::Relaxed)
     }
 }
 
@@ -148,7 +146,6 @@ pub fn run_watched<R: Send + 'static>(
             Err(RecvTimeoutError::Timeout) => {}
         }
         if let Err(interrupt) = py.check_signals() {
-            // meshes look at it; a volume and a count of thin cells go on unseen to their end
             watch.0.store(true, Ordering::Relaxed);
             // what follows gets threads of its own, and these end with their work
             POOLS

@@ -3,7 +3,7 @@
 use pyo3::prelude::*;
 use rfm::geom::Aabb;
 use rfm::glam::DVec3;
-use rfm::mesh::{Grid, Mesh, MeshError, Resolution, dual_contouring, split_creases};
+use rfm::mesh::{Grid, Mesh, MeshError, Resolution, Unwatched, dual_contouring, split_creases};
 use rfm::solid::{Bounds, Chosen};
 use rfm::sph::Simulation;
 use rfm::view::{
@@ -141,5 +141,5 @@ fn page_of_simulation(experiment: &Experiment, simulation: &Simulation, facts: &
 }
 
 fn mesh(solid: &Solid, grid: &Grid) -> Result<Mesh, MeshError> {
-    dual_contouring(&*solid.surface(*grid.bounds()), grid, &|_| {})
+    dual_contouring(&*solid.surface(*grid.bounds()), grid, &Unwatched)
 }

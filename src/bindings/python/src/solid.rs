@@ -454,7 +454,7 @@ impl PySolid {
         Self::new(self.program.bind(py), self.solid.clone(), self.stretch, Some(aabb(r#box)?))
     }
 
-    /// The volume, m³, found on meshes with `cells` cells and half as many along the longest side.
+    /// The volume, m³, found on meshes with `cells` cells, two thirds and half as many along the longest side.
     ///
     /// Parameters
     /// ----------
@@ -464,7 +464,7 @@ impl PySolid {
     #[pyo3(text_signature = "($self, cells=96, *, threads=None)")]
     fn volume(&self, py: Python<'_>, cells: usize, threads: Threads) -> PyResult<f64> {
         let solid = self.solid.clone();
-        run_watched(py, threads, move |_| crate::mesh::volume(&solid, cells))?
+        run_watched(py, threads, move |watch| crate::mesh::volume(&solid, cells, watch))?
     }
 
     /// A closed triangle mesh of the surface.

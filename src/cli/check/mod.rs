@@ -1,5 +1,8 @@
 //! `rfm check`: messages about files, the solids with their bounds and volumes, and slices.
 
+mod facts;
+mod measure;
+
 use std::io::IsTerminal;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant, SystemTime};
@@ -7,24 +10,21 @@ use std::time::{Duration, Instant, SystemTime};
 use serde::Serialize;
 
 use super::args::{Check, MessageFormat, Shared};
+use super::deadline::Deadline;
 use super::failure::{Failure, complain, note, warn};
 use super::findings::{self, Message, message};
 use super::mesh::hidden;
 use super::{choose, input, lints, output, section};
-use crate::cli::output::{Shown, significant};
+use facts::{Box3, Facts, RESOLUTION, VOLUME_CELLS, print};
+use measure::measure;
 use rfm::diagnostic::{Code, Diagnostic, Diagnostics};
-use rfm::geom::{Aabb, to_thousandths};
+use rfm::geom::Aabb;
 use rfm::glam::DVec3;
-use rfm::interval::Interval;
 use rfm::ir::{Axis, Magnitudes};
 use rfm::lower::NamedSolid;
-use rfm::mesh::{self, Grid, Resolution, ThinCells, VolumeError};
+use rfm::mesh::{Grid, ThinCells};
 use rfm::solid::{Bounds, ProgramKind, Unbounded};
 use rfm::{Precision, Program, Solid};
-
-/// Cells along the longest side of the mesh that volumes are measured on.
-const VOLUME_CELLS: usize = 96;
-const RESOLUTION: Resolution = Resolution::Cells(VOLUME_CELLS);
 
 #[derive(Serialize)]
 struct Document {
@@ -39,81 +39,6 @@ const SECONDS_BY_LEAVES: f64 = 8e-5;
 
 /// Seconds for each operation of a solid that is evaluated as a whole, at a million points.
 const SECONDS_AS_A_WHOLE: f64 = 4e-4;
-
-/// Boxes along each side of a solid in which its range is tried; one in so many may be unknown.
-const PROBES: u32 = 16;
-const MOST_UNKNOWN: usize = 50;
-
-/// What is known about a solid. Numbers that do not exist (the volume of an unbounded solid) or that were not
-/// found (the volume of one too thin for the grid) are null.
-#[derive(Serialize)]
-struct Facts {
-    name: String,
-    file: String,
-    empty: bool,
-    bounds: Option<Box3>,
-    volume: Option<f64>,
-    /// Estimated from two resolutions.
-    volume_error: Option<f64>,
-    area: Option<f64>,
-    /// Estimated from two resolutions.
-    area_error: Option<f64>,
-    components: Option<usize>,
-    /// Whether two resolutions have as many components and no part is thinner than a cell. If not, the volume,
-    /// the area and their errors are those of what the finer one shows.
-    resolved: Option<bool>,
-    /// The tolerance for the error of ω that the file states, the program that keeps it, and the program's
-    /// certified bound.
-    tolerance: Option<f64>,
-    program: Option<String>,
-    error_bound: Option<f64>,
-    /// The time in seconds for which all this holds. Null for a solid at rest.
-    time: Option<f64>,
-    /// The number of cells of the finer grid in which parts of the surface hide, see `mesh::thin_cells`.
-    thin_cells: Option<usize>,
-    /// The number of components that half as many cells show.
-    #[serde(skip)]
-    components_coarser: Option<usize>,
-    /// Why there is no volume although there are bounds.
-    #[serde(skip)]
-    no_volume: Option<String>,
-}
-
-impl Facts {
-    fn unknown(solid: &Solid, file: &str) -> Self {
-        Self {
-            name: solid.name().to_string(),
-            file: file.to_string(),
-            empty: false,
-            bounds: None,
-            volume: None,
-            volume_error: None,
-            area: None,
-            area_error: None,
-            components: None,
-            resolved: None,
-            tolerance: None,
-            program: None,
-            error_bound: None,
-            time: solid.moves().then(|| solid.time()),
-            thin_cells: None,
-            components_coarser: None,
-            no_volume: None,
-        }
-    }
-}
-
-#[derive(Serialize)]
-struct Box3 {
-    min: [f64; 3],
-    max: [f64; 3],
-}
-
-impl Box3 {
-    fn of(bounds: &Aabb) -> Self {
-        Self { min: bounds.min.to_array(), max: bounds.max.to_array() }
-    }
-}
 
 pub(super) fn run(shared: &Shared, options: &Check) -> Result<(), Failure> {
     if !options.slice.is_empty() && options.files.len() > 1 {
@@ -257,6 +182,7 @@ fn solids(
     diagnostics: &mut Diagnostics,
 ) -> Result<Vec<Facts>, Failure> {
     let (time, budget) = (options.time, options.budget);
+    let deadline = Deadline::after(budget);
     let (mut facts, mut searches) = (Vec::new(), lints::Searches::new());
     let (start, all) = (Instant::now(), &program.module().solids);
     let chosen = |name: &String| {
@@ -288,7 +214,7 @@ fn solids(
             facts.push(Facts { tolerance, bounds, empty, ..unknown });
             continue;
         }
-        let (mut found, thin) = measure(&solid, file)?;
+        let (mut found, thin) = measure(&solid, file, &deadline)?;
         diagnostics.list.extend(overflow(program, named, &solid));
         found.tolerance = program.tolerance(&named.name).map(|tolerance| tolerance.value);
         match program.within_tolerance(&solid) {
@@ -423,173 +349,12 @@ fn overflow(program: &Program, named: &NamedSolid, solid: &Solid) -> Option<Diag
     Some(warning.help("write it as one chain: it is evaluated as a balanced tree"))
 }
 
-fn measure(solid: &Solid, file: &str) -> Result<(Facts, ThinCells), Failure> {
-    let mut facts = Facts::unknown(solid, file);
-    let bounds = match solid.bounds() {
-        Bounds::Within(bounds) => bounds,
-        Bounds::Unbounded => return Ok((facts, ThinCells::NONE)),
-        Bounds::Empty => {
-            let zero = Some(0.0);
-            let facts = Facts {
-                empty: true,
-                volume: zero,
-                volume_error: zero,
-                area: zero,
-                area_error: zero,
-                components: Some(0),
-                resolved: Some(true),
-                thin_cells: Some(0),
-                ..facts
-            };
-            return Ok((facts, ThinCells::NONE));
-        }
-    };
-    facts.bounds = Some(Box3::of(bounds));
-    let surface = solid.surface(bounds.grown(0.1 * bounds.size().max_element()));
-    let grid = Grid::around(bounds, RESOLUTION).map_err(|error| {
-        let place = to_thousandths(bounds.centre());
-        Failure::usage(format!("cannot divide the room around `{}`, at {place}: {error}", solid.name()))
-    })?;
-    let thin = if knows_ranges(solid, bounds) {
-        Some(mesh::thin_cells(&*surface, &grid).unwrap_or(ThinCells::NONE))
-    } else {
-        note(format!(
-            "thin parts of `{}` are not looked for: the ranges of its formula are unknown",
-            solid.name()
-        ));
-        None
-    };
-    match mesh::volume(&*surface, bounds, VOLUME_CELLS) {
-        Ok(found) => {
-            facts.volume = Some(found.volume);
-            facts.volume_error = Some(found.error);
-            facts.area = Some(found.area);
-            facts.area_error = Some(found.area_error);
-            facts.components = Some(found.solids);
-            facts.components_coarser = Some(found.solids_coarser);
-            // what is left out at the edge of a wedge is within the errors
-            let no_thin_parts = thin.as_ref().is_some_and(|thin| thin.count == 0 || thin.is_wedge);
-            facts.resolved = Some(found.solids == found.solids_coarser && no_thin_parts);
-        }
-        Err(VolumeError::TooThin) => {
-            facts.no_volume = Some(format!("too thin for {VOLUME_CELLS} cells along its longest side"));
-        }
-        Err(error @ VolumeError::TooFewCells(_)) => return Err(Failure::usage(error)),
-        Err(VolumeError::Grid(error)) => return Err(Failure::usage(error)),
-        Err(VolumeError::Mesh(error)) => {
-            facts.no_volume = Some(error.to_string());
-            return Ok((facts, ThinCells::NONE));
-        }
-    }
-    facts.thin_cells = thin.as_ref().map(|thin| thin.count);
-    Ok((facts, thin.unwrap_or(ThinCells::NONE)))
-}
-
-/// Whether ranges tell anything of the solid nearly everywhere in a box. Where they do not, a search for thin
-/// parts would divide every cell to the end.
-fn knows_ranges(solid: &Solid, bounds: &Aabb) -> bool {
-    let size = bounds.size() / f64::from(PROBES);
-    let probe = |i: u32| {
-        let place =
-            DVec3::new(f64::from(i % PROBES), f64::from(i / PROBES % PROBES), f64::from(i / PROBES.pow(2)));
-        let low = bounds.min + size * place;
-        solid.range(&Aabb::new(low, low + size)) == Interval::ALL
-    };
-    let unknown = (0..PROBES.pow(3)).filter(|&i| probe(i)).count();
-    unknown * MOST_UNKNOWN <= PROBES.pow(3) as usize
-}
-
-fn print(file: &str, program: &Program, facts: &[Facts]) {
-    let module = program.module();
-    let count = |n: usize, what: &str| format!("{n} {what}{}", if n == 1 { "" } else { "s" });
-    say!(
-        "{}: {}, {}",
-        Path::new(file).shown(),
-        count(module.solids.len(), "solid"),
-        count(module.scenes.len(), "scene")
-    );
-    for param in &module.params {
-        let shown = |value| param.shown(value);
-        let range = param.range.map(|(low, high)| format!(" in {} .. {}", shown(low), shown(high)));
-        let doc = param.doc.as_ref().map(|doc| format!("   {doc}"));
-        let (range, doc) = (range.unwrap_or_default(), doc.unwrap_or_default());
-        say!("  param {} = {}{range}{doc}", param.name, shown(param.value));
-    }
-    facts.iter().for_each(print_solid);
-    for scene in &module.scenes {
-        let obstacles: Vec<&str> = scene.obstacles.iter().map(|o| o.name.as_str()).collect();
-        let particles =
-            scene.fluid.particles.map_or("as many particles as fit".into(), |n| format!("{n} particles"));
-        let around =
-            if obstacles.is_empty() { String::new() } else { format!(" around {}", obstacles.join(", ")) };
-        say!("  scene {}: {particles} of {}{around}, {} s", scene.name, scene.fluid.name, scene.run.until);
-    }
-}
-
-/// Prints what is known of a solid.
-fn print_solid(solid: &Facts) {
-    say!("  solid {}", solid.name);
-    if let Some(time) = solid.time {
-        say!("    moves       at t = {time} s:");
-    }
-    if solid.empty {
-        say!("    empty");
-    }
-    if let Some(bounds) = &solid.bounds {
-        let [min, max] = corners(bounds);
-        say!("    bounds      {min} … {max}");
-        if let Some(why) = &solid.no_volume {
-            say!("    volume      not found: {why}");
-        }
-    } else if !solid.empty {
-        say!("    bounds      none found");
-    }
-    // the error is found from two grids, which both miss what is not resolved
-    let measured = |value: f64, error: f64| match solid.resolved {
-        Some(false) => format!("{}, not resolved", significant(value, 3)),
-        Some(true) | None => format!("{} ± {error:.1e}", significant(value, 6)),
-    };
-    if let (Some(volume), Some(error), false) = (solid.volume, solid.volume_error, solid.empty) {
-        say!("    volume      {}", measured(volume, error));
-    }
-    if let (Some(area), Some(error), false) = (solid.area, solid.area_error, solid.empty) {
-        say!("    area        {}", measured(area, error));
-    }
-    if let (Some(components), Some(coarser), false) =
-        (solid.components, solid.components_coarser, solid.empty)
-    {
-        let half = VOLUME_CELLS / 2;
-        match coarser == components {
-            true => say!("    components  {components}"),
-            false => say!(
-                "    components  {components}, but {coarser} with {half} cells instead of {VOLUME_CELLS}"
-            ),
-        }
-    }
-    if solid.resolved == Some(false) {
-        say!("    not resolved: volume, area and components are those of what {VOLUME_CELLS} cells show");
-    }
-    if let (Some(name), Some(bound), Some(tolerance)) = (&solid.program, solid.error_bound, solid.tolerance) {
-        say!("    program     {name}: ω to {bound:.1e}, tolerance {tolerance:e}");
-    }
-}
-
-/// The corners of a box, with as many digits behind the point as the box is small.
-fn corners(bounds: &Box3) -> [String; 2] {
-    let size = (0..3).map(|i| bounds.max[i] - bounds.min[i]).fold(f64::MIN_POSITIVE, f64::max);
-    let digits = (3.0 - size.log10().floor()).clamp(4.0, 12.0) as usize;
-    // rounded first, so that zero has no sign
-    let unit = 10f64.powi(digits as i32);
-    let shown = |x: f64| format!("{:.digits$}", (unit * x).round() / unit + 0.0);
-    [bounds.min, bounds.max].map(|corner| format!("({})", corner.map(shown).join(", ")))
-}
-
 #[cfg(test)]
 mod tests {
     use super::is_over;
 
     #[test]
-    fn one_solid_is_measured_however_long_it_takes_and_no_more_when_the_budget_is_spent() {
+    fn one_solid_is_measured_as_far_as_the_budget_goes_and_no_more_when_it_is_spent() {
         assert!(!is_over(0, 3, 100.0, 10.0));
         assert!(!is_over(1, 3, 9.9, 10.0));
         assert!(is_over(1, 3, 10.1, 10.0));

@@ -1,0 +1,176 @@
+//! What is known about a solid, and how it is printed.
+
+use std::path::Path;
+
+use serde::Serialize;
+
+use crate::cli::output::{Shown, significant};
+use rfm::geom::Aabb;
+use rfm::mesh::Resolution;
+use rfm::{Program, Solid};
+
+/// Cells along the longest side of the mesh that volumes are measured on.
+pub(super) const VOLUME_CELLS: usize = 96;
+pub(super) const RESOLUTION: Resolution = Resolution::Cells(VOLUME_CELLS);
+
+/// What is known about a solid. Numbers that do not exist (the volume of an unbounded solid) or that were not
+/// found (the volume of one too thin for the grid) are null.
+#[derive(Serialize)]
+pub(super) struct Facts {
+    pub name: String,
+    pub file: String,
+    pub empty: bool,
+    pub bounds: Option<Box3>,
+    pub volume: Option<f64>,
+    /// Estimated from three resolutions.
+    pub volume_error: Option<f64>,
+    pub area: Option<f64>,
+    /// Estimated from three resolutions.
+    pub area_error: Option<f64>,
+    pub components: Option<usize>,
+    /// Whether two resolutions have as many components, and no part but the edges of wedges is thinner than a cell. If
+    /// not, the volume, the area and their errors are those of what the finer one shows. `None` if the search for
+    /// such parts was ended.
+    pub resolved: Option<bool>,
+    /// The tolerance for the error of ω that the file states, the program that keeps it, and the program's
+    /// certified bound.
+    pub tolerance: Option<f64>,
+    pub program: Option<String>,
+    pub error_bound: Option<f64>,
+    /// The time in seconds for which all this holds. Null for a solid at rest.
+    pub time: Option<f64>,
+    /// The number of cells of the finer grid in which parts of the surface hide, see `mesh::thin_cells`.
+    pub thin_cells: Option<usize>,
+    /// What was not finished within the budget: `volume` (and area), `thin_cells`.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub unfinished: Vec<&'static str>,
+    /// The number of components that half as many cells show.
+    #[serde(skip)]
+    pub components_coarser: Option<usize>,
+    /// Why there is no volume although there are bounds.
+    #[serde(skip)]
+    pub no_volume: Option<String>,
+}
+
+impl Facts {
+    pub fn unknown(solid: &Solid, file: &str) -> Self {
+        Self {
+            name: solid.name().to_string(),
+            file: file.to_string(),
+            empty: false,
+            bounds: None,
+            volume: None,
+            volume_error: None,
+            area: None,
+            area_error: None,
+            components: None,
+            resolved: None,
+            tolerance: None,
+            program: None,
+            error_bound: None,
+            time: solid.moves().then(|| solid.time()),
+            thin_cells: None,
+            unfinished: Vec::new(),
+            components_coarser: None,
+            no_volume: None,
+        }
+    }
+}
+
+#[derive(Serialize)]
+pub(super) struct Box3 {
+    min: [f64; 3],
+    max: [f64; 3],
+}
+
+impl Box3 {
+    pub fn of(bounds: &Aabb) -> Self {
+        Self { min: bounds.min.to_array(), max: bounds.max.to_array() }
+    }
+}
+
+/// Prints a file's parameters, solids and scenes.
+pub(super) fn print(file: &str, program: &Program, facts: &[Facts]) {
+    let module = program.module();
+    let count = |n: usize, what: &str| format!("{n} {what}{}", if n == 1 { "" } else { "s" });
+    say!(
+        "{}: {}, {}",
+        Path::new(file).shown(),
+        count(module.solids.len(), "solid"),
+        count(module.scenes.len(), "scene")
+    );
+    for param in &module.params {
+        let shown = |value| param.shown(value);
+        let range = param.range.map(|(low, high)| format!(" in {} .. {}", shown(low), shown(high)));
+        let doc = param.doc.as_ref().map(|doc| format!("   {doc}"));
+        let (range, doc) = (range.unwrap_or_default(), doc.unwrap_or_default());
+        say!("  param {} = {}{range}{doc}", param.name, shown(param.value));
+    }
+    facts.iter().for_each(print_solid);
+    for scene in &module.scenes {
+        let obstacles: Vec<&str> = scene.obstacles.iter().map(|o| o.name.as_str()).collect();
+        let particles =
+            scene.fluid.particles.map_or("as many particles as fit".into(), |n| format!("{n} particles"));
+        let around =
+            if obstacles.is_empty() { String::new() } else { format!(" around {}", obstacles.join(", ")) };
+        say!("  scene {}: {particles} of {}{around}, {} s", scene.name, scene.fluid.name, scene.run.until);
+    }
+}
+
+/// Prints what is known of a solid.
+fn print_solid(solid: &Facts) {
+    say!("  solid {}", solid.name);
+    if let Some(time) = solid.time {
+        say!("    moves       at t = {time} s:");
+    }
+    if solid.empty {
+        say!("    empty");
+    }
+    if let Some(bounds) = &solid.bounds {
+        let [min, max] = corners(bounds);
+        say!("    bounds      {min} … {max}");
+        if let Some(why) = &solid.no_volume {
+            say!("    volume      not found: {why}");
+        }
+    } else if !solid.empty {
+        say!("    bounds      none found");
+    }
+    // the error is found from three grids, which all miss what is not resolved
+    let measured = |value: f64, error: f64| match solid.resolved {
+        Some(false) => format!("{}, not resolved", significant(value, 3)),
+        Some(true) | None => format!("{} ± {error:.1e}", significant(value, 6)),
+    };
+    if let (Some(volume), Some(error), false) = (solid.volume, solid.volume_error, solid.empty) {
+        say!("    volume      {}", measured(volume, error));
+    }
+    if let (Some(area), Some(error), false) = (solid.area, solid.area_error, solid.empty) {
+        say!("    area        {}", measured(area, error));
+    }
+    if let (Some(components), Some(coarser), false) =
+        (solid.components, solid.components_coarser, solid.empty)
+    {
+        let half = VOLUME_CELLS / 2;
+        match coarser == components {
+            true => say!("    components  {components}"),
+            false => say!(
+                "    components  {components}, but {coarser} with {half} cells instead of {VOLUME_CELLS}"
+            ),
+        }
+    }
+    if solid.resolved == Some(false) {
+        say!("    not resolved: volume, area and components are those of what {VOLUME_CELLS} cells show");
+    }
+    if let (Some(name), Some(bound), Some(tolerance)) = (&solid.program, solid.error_bound, solid.tolerance) {
+        say!("    program     {name}: ω to {bound:.1e}, tolerance {tolerance:e}");
+    }
+}
+
+/// The corners of a box, with as many digits behind the point as the box is small.
+fn corners(bounds: &Box3) -> [String; 2] {
+    let size = (0..3).map(|i| bounds.max[i] - bounds.min[i]).fold(f64::MIN_POSITIVE, f64::max);
+    let digits = (3.0 - size.log10().floor()).clamp(4.0, 12.0) as usize;
+    // rounded first, so that zero has no sign
+    let unit = 10f64.powi(digits as i32);
+    let shown = |x: f64| format!("{:.digits$}", (unit * x).round() / unit + 0.0);
+    [bounds.min, bounds.max].map(|corner| format!("({})", corner.map(shown).join(", ")))
+}

@@ -1,0 +1,39 @@
+//! The end of the time for a piece of work.
+
+use std::time::{Duration, Instant};
+
+use rfm::mesh::Watch;
+
+/// Ends the work at an instant. What is found until then depends on the machine.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Deadline(pub Instant);
+
+impl Deadline {
+    /// An instant so many seconds from now; far away if that is no time that can be stated.
+    pub fn after(seconds: f64) -> Self {
+        let far = Duration::from_secs(60 * 60 * 24 * 365);
+        let wait = Duration::try_from_secs_f64(seconds.max(0.0)).map_or(far, |wait| wait.min(far));
+        Self(Instant::now() + wait)
+    }
+}
+
+impl Watch for Deadline {
+    fn is_over(&self) -> bool {
+        Instant::now() >= self.0
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn times_that_are_no_times_are_over_or_far_away() {
+        for seconds in [1e300, f64::INFINITY, 60.0] {
+            assert!(!Deadline::after(seconds).is_over());
+        }
+        for seconds in [-1.0, 0.0, f64::NAN] {
+            assert!(Deadline::after(seconds).is_over());
+        }
+    }
+}

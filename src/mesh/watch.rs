@@ -1,0 +1,36 @@
+//! Who waits for long work: is told how far it is, and may end it.
+
+/// Waits for the making or the measuring of a mesh.
+///
+/// A closure `|done: f64| …` is one that is told how far the work is and never ends it.
+pub trait Watch: Sync {
+    /// Receives the share of the work that is done, in (0, 1]. It is called from any thread, not always in ascending
+    /// order.
+    fn progress(&self, _done: f64) {}
+
+    /// Whether the work is to end. It looks here before each of its tasks and steps, of which the longest mend a mesh.
+    fn is_over(&self) -> bool {
+        false
+    }
+}
+
+impl<F: Fn(f64) + Sync> Watch for F {
+    fn progress(&self, done: f64) {
+        self(done);
+    }
+}
+
+/// Nobody: the work goes on to its end.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Unwatched;
+
+impl Watch for Unwatched {}
+
+/// Ends what another watch ends, and tells it nothing: each mesh is a part of the work.
+pub(super) struct Ends<'a>(pub &'a dyn Watch);
+
+impl Watch for Ends<'_> {
+    fn is_over(&self) -> bool {
+        self.0.is_over()
+    }
+}
