@@ -183,7 +183,8 @@ impl Depth {
         }
         if thin.ended {
             note(format!(
-                "distances are measured from a mesh of `{name}`; whether it misses what is thin was not found out in time"
+                "distances are measured from a mesh of `{name}`; whether it misses what is thin was not found out in \
+                 time"
             ));
         }
         let name = name.to_string();

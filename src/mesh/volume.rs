@@ -85,21 +85,30 @@ pub fn volume(
     if fine[1] == 0.0 {
         return Err(VolumeError::TooThin);
     }
-    // vertices lie on the surface, so the area's error falls as h², and a third of the difference leads to the limit;
     // edges that no vertex has caught lie unevenly between the cells, so the whole difference is given as the error,
     // and as two sizes may agree by chance, a third one has a say
     let error = |i: usize| {
         let all = [fine[i] - coarse[i], fine[i] - middle[i], middle[i] - coarse[i]];
         all.into_iter().fold(ROUNDING * fine[i].abs(), |most, difference| most.max(difference.abs()))
     };
+    let (area, is_limit) = limit([coarse[1], middle[1], fine[1]]);
     Ok(Volume {
         volume: fine[0],
         error: error(0),
-        area: fine[1] + (fine[1] - coarse[1]) / 3.0,
-        area_error: error(1),
+        area,
+        area_error: if is_limit { error(1) } else { UNCERTAIN * error(1) },
         solids,
         solids_coarser,
     })
+}
+
+/// Where three areas lead to, of cells in the ratio of 4 to 3 to 2. Vertices lie on the surface, so that the error falls
+/// with the square of the cell; if it does not, a part has come in sight from one to the next, and the last one counts.
+/// Also whether it does.
+fn limit([coarse, middle, fine]: [f64; 3]) -> (f64, bool) {
+    // (3² − 2²)/(4² − 2²), roughly
+    let falls = (0.25..0.6).contains(&((fine - middle) / (fine - coarse)));
+    (if falls { fine + (fine - coarse) / 3.0 } else { fine }, falls)
 }
 
 /// The volume between a mesh and the surface, m³, negative where the mesh is outside: the integral of the distance, to
@@ -129,6 +138,9 @@ fn beyond(field: &dyn Field, mesh: &Mesh, cell: f64) -> f64 {
 
 /// Triangles that a thread takes at a time.
 const TRIANGLES_PER_PART: usize = 4096;
+
+/// Where the error of an area does not fall as it should, so many times the differences are given.
+const UNCERTAIN: f64 = 2.0;
 
 /// The least relative error: sums over many triangles are not more exact.
 const ROUNDING: f64 = 1e-12;
@@ -204,6 +216,15 @@ mod tests {
             (found.volume - exact).abs() < found.error && found.error < 2e-3 * exact,
             "{found:?} {exact}"
         );
+    }
+
+    #[test]
+    fn areas_lead_to_a_limit_where_their_errors_fall_with_the_square_of_the_cell() {
+        let areas = [4.0, 3.0, 2.0].map(|cell: f64| 10.0 - 0.1 * cell * cell);
+        assert!((limit(areas).0 - 10.0).abs() < 1e-12);
+        // fins that only the last one shows
+        assert_eq!(limit([100.0, 110.0, 174.6]), (174.6, false));
+        assert_eq!(limit([6.0, 6.0, 6.0]), (6.0, false));
     }
 
     #[test]

@@ -72,8 +72,8 @@ pub(super) fn measure(solid: &Solid, file: &str, deadline: &Deadline) -> Result<
     if thin.is_some_and(|thin| thin.ended) {
         facts.unfinished.push("thin_cells");
         note(format!(
-            "the search for thin parts of `{}` was ended before all of its surface was looked at; --budget gives it more \
-             time",
+            "the search for thin parts of `{}` was ended before all of its surface was looked at; --budget gives it \
+             more time",
             solid.name()
         ));
     }

@@ -241,12 +241,22 @@ fn print(forecast: &Forecast) {
         free(forecast.disk_bytes_free)
     );
     say!(
-        "time          about {} ({:.1} s to start, {:.3} ms per step, {:.0} ms per frame)",
+        "time          about {} ({} to start, {} per step, {} per frame)",
         duration(forecast.seconds),
-        forecast.seconds_to_start,
-        forecast.milliseconds_per_step,
-        forecast.milliseconds_per_frame
+        short(forecast.seconds_to_start),
+        short(1e-3 * forecast.milliseconds_per_step),
+        short(1e-3 * forecast.milliseconds_per_frame)
     );
+}
+
+/// A short time as a person says it: `0.35 ms`, `31 ms`, `2.4 s`, and longer ones as [`duration`] does.
+fn short(seconds: f64) -> String {
+    let digits = |value: f64| if value < 10.0 { format!("{value:.2}") } else { format!("{value:.0}") };
+    match seconds {
+        s if s < 1.0 => format!("{} ms", digits(1e3 * s)),
+        s if s < 10.0 => format!("{s:.1} s"),
+        s => duration(s),
+    }
 }
 
 /// A number of bytes as a person says it.
@@ -297,4 +307,15 @@ fn free_disk(folder: &Path) -> Option<f64> {
 #[cfg(not(unix))]
 fn free_disk(_: &Path) -> Option<f64> {
     None
+}
+
+#[cfg(test)]
+mod tests {
+    use super::short;
+
+    #[test]
+    fn short_times_have_two_or_three_digits() {
+        let shown = [3.5e-4, 9.876e-3, 0.0314, 0.5, 2.42, 5600.0].map(short);
+        assert_eq!(shown, ["0.35 ms", "9.88 ms", "31 ms", "500 ms", "2.4 s", "93 min"]);
+    }
 }

@@ -24,8 +24,8 @@ use crate::geom::Aabb;
 /// How often folded triangles are looked for and mended.
 const REPAIRS: usize = 4;
 
-/// Evaluations for mending where triangles are not to cross, as a share of those that found the surface, which were made
-/// many at a time, and the fewest.
+/// Evaluations for mending where triangles are not to cross, as a share of those that found the surface, which were
+/// made many at a time, and the fewest.
 const MENDING: f64 = 0.25;
 const LEAST_MENDING: u64 = 20_000;
 

@@ -19,8 +19,8 @@ pub struct ThinCells {
     pub at: DVec3,
     /// Whether a gap is that thin, rather than a part of the solid.
     pub is_gap: bool,
-    /// Whether all of them are edges, tips and rims of what grows to something that the grid shows. No grid shows all of
-    /// such an edge.
+    /// Whether all of them are edges, tips and rims of what grows to something that the grid shows. No grid shows all
+    /// of such an edge.
     pub is_wedge: bool,
     /// Whether the search was ended before all cells were looked into.
     pub ended: bool,

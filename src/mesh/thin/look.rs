@@ -357,8 +357,8 @@ impl Look<'_> {
         ThinCells { count: 1, bounds: self.bounds, thickness, at: foot.at, is_gap, is_wedge, ended: false }
     }
 
-    /// Whether a part, or a gap, is the edge or the tip of something that the grid shows: between the faces that meet there it
-    /// grows to the thickness of two cells, and no other face comes in between.
+    /// Whether a part, or a gap, is the edge or the tip of something that the grid shows: between the faces that meet
+    /// there it grows to the thickness of two cells, and no other face comes in between.
     fn opens(&self, foot: &Foot, opposite: &Across, is_gap: bool) -> bool {
         let outwards = if is_gap { 1.0 } else { -1.0 };
         let faces = [foot.normal, opposite.normal];
@@ -394,8 +394,8 @@ impl Look<'_> {
         false
     }
 
-    /// How far a point in a part or in a gap is from a face in one direction, at most two cells. `None` if the point does not
-    /// lie there, or another face ends it.
+    /// How far a point in a part or in a gap is from a face in one direction, at most two cells. `None` if the point
+    /// does not lie there, or another face ends it.
     fn end(&self, from: DVec3, way: DVec3, face: DVec3, is_gap: bool) -> Option<f64> {
         let is_within = |p: DVec3| (self.omega(p) > 0.0) != is_gap;
         if !is_within(from) {

@@ -1,8 +1,8 @@
 //! Formulas in pieces: `round(z/d)` has one value on each side of its jumps.
 //!
 //! A box in which a formula may jump has a range that mixes both sides: what is one pitch below a coil of a spring, and
-//! what is one above, seem to meet. With each value of the jump by itself the bounds are those of two smooth formulas, and
-//! what is far from the surface on either side is seen to be.
+//! what is one above, seem to meet. With each value of the jump by itself the bounds are those of two smooth formulas,
+//! and what is far from the surface on either side is seen to be.
 
 use std::sync::OnceLock;
 
@@ -99,8 +99,8 @@ impl Pieces {
         self.formula.is_tame(Region { parameters, uniforms: &values, ..Region::of(&everywhere) })
     }
 
-    /// The range over a box, as the hull of the ranges of the pieces in it. `None` where there is one piece or very many,
-    /// or one that may be undefined.
+    /// The range over a box, as the hull of the ranges of the pieces in it. `None` where there is one piece or very
+    /// many, or one that may be undefined.
     pub fn range(&self, over: &Aabb, parameters: &[f64], by_code: bool) -> Option<Interval> {
         let mut pieces: SmallVec<[Values; MOST_PIECES]> = SmallVec::from_iter([Values::new()]);
         for jump in &self.jumps {

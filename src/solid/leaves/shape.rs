@@ -321,3 +321,50 @@ impl Evaluator {
         self.interpreter.eval_given(Given { parameters, uniforms, ..Given::point(p) }, out);
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::ir::Axis;
+
+    /// Ranges of the slopes of min(x + y, 1.25·x + y, 4 − |z|) by machine code, where it may be either of the first two.
+    #[test]
+    fn slopes_of_a_minimum_are_those_of_either_operand() {
+        let mut graph = Graph::default();
+        let [x, y, z] = [Axis::X, Axis::Y, Axis::Z].map(|axis| graph.coordinate(axis));
+        let [steep, four] = [1.25, 4.0].map(|number| graph.constant(number));
+        let steeper = graph.binary(Binary::Mul, steep, x);
+        let [a, b] = [x, steeper].map(|along| graph.binary(Binary::Add, along, y));
+        let size = graph.unary(Unary::Abs, z);
+        let lid = graph.binary(Binary::Sub, four, size);
+        let smaller = graph.binary(Binary::Min, a, b);
+        let root = graph.binary(Binary::Min, smaller, lid);
+        let (graph, root) = graph.extract_cone(root);
+        let mut shape = Shape::new(graph, root, 0);
+        shape.leaves = MANY_LEAVES;
+        let Some(program) = shape.slopes(Engine::Auto) else {
+            // where there is no code generator the interpreter answers
+            return assert!(RangeProgram::with_parameters(&shape.graph, root, 0).is_err());
+        };
+        assert!(program.is_tame(&[]));
+        let over = |low: f64, high: f64| Aabb::new(DVec3::splat(low), DVec3::splat(high));
+        let holds = |found: Interval, low: f64, high: f64| {
+            let near = |a: f64, b: f64| (a - b).abs() < 1e-12;
+            near(found.lo, low) && near(found.hi, high)
+        };
+        // both of the first two, and never the third
+        let slopes = program.over(&over(-1.0, 1.0), &[]).unwrap();
+        assert!(holds(slopes[0], 1.0, 1.25) && holds(slopes[1], 1.0, 1.0), "{slopes:?}");
+        assert!(holds(slopes[2], 0.0, 0.0), "{slopes:?}");
+        // the first one alone, and the second one
+        let small = |x: f64| Aabb::new(DVec3::new(x, 0.0, 0.0), DVec3::new(x + 0.1, 0.01, 0.01));
+        let slopes = [small(1.0), small(-1.1)].map(|over| program.over(&over, &[]).unwrap());
+        assert!(holds(slopes[0][0], 1.0, 1.0) && holds(slopes[1][0], 1.25, 1.25), "{slopes:?}");
+        // all three
+        let slopes = program.over(&over(-4.0, 4.0), &[]).unwrap();
+        assert!(
+            holds(slopes[0], 0.0, 1.25) && holds(slopes[1], 0.0, 1.0) && holds(slopes[2], -1.0, 1.0),
+            "{slopes:?}"
+        );
+    }
+}
