@@ -87,7 +87,7 @@ pub(super) fn measure(solid: &Solid, file: &str, deadline: &Deadline) -> Result<
     Ok((facts, thin.unwrap_or(ThinCells::NONE)))
 }
 
-/// What the finer mesh misses; `None` if the formula does not let it be found.
+/// What the finest mesh misses; `None` if the formula does not let it be found.
 fn thin_cells(solid: &Solid, surface: &dyn Field, grid: &Grid, deadline: &Deadline) -> Option<ThinCells> {
     if !knows_ranges(solid, grid.bounds()) {
         note(format!(
@@ -96,7 +96,7 @@ fn thin_cells(solid: &Solid, surface: &dyn Field, grid: &Grid, deadline: &Deadli
         ));
         return None;
     }
-    // what has no mesh has none of its parts
+    // a formula that is not a number somewhere has no such search; its volume has told of it
     mesh::thin_cells(surface, grid, deadline).ok()
 }
 

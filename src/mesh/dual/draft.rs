@@ -29,8 +29,8 @@ const REPAIRS: usize = 4;
 const MENDING: f64 = 0.25;
 const LEAST_MENDING: u64 = 20_000;
 
-/// The same where nothing crosses. The examples need up to four times as many as found the surface; a mesh of a surface
-/// with details everywhere would never be done.
+/// Evaluations for mending where nothing crosses, and the fewest. The examples need up to four times as many as found
+/// the surface; without an end a mesh of a surface with details everywhere would never be done.
 const SHARP_MENDING: f64 = 8.0;
 const LEAST_SHARP_MENDING: u64 = 200_000;
 
