@@ -226,8 +226,10 @@ fn base_unit(word: &str) -> Option<Unit> {
         "h" => unit(3600.0, Dimension::TIME),
         "Hz" => unit(1.0, Dimension::new(0, 0, -1, 0)),
         "N" => unit(1.0, Dimension::FORCE),
+        "mN" => unit(1e-3, Dimension::FORCE),
         "kN" => unit(1e3, Dimension::FORCE),
         "Pa" => unit(1.0, Dimension::PRESSURE),
+        "mPa" => unit(1e-3, Dimension::PRESSURE),
         "kPa" => unit(1e3, Dimension::PRESSURE),
         "MPa" => unit(1e6, Dimension::PRESSURE),
         "J" => unit(1.0, Dimension::ENERGY),
@@ -253,6 +255,7 @@ mod tests {
         check("kg/m^3", 1.0, Dimension::DENSITY);
         check("g/cm³", 1000.0, Dimension::DENSITY);
         check("Pa·s", 1.0, Dimension::VISCOSITY);
+        check("mPa·s", 1e-3, Dimension::VISCOSITY);
         check("N/m", 1.0, Dimension::TENSION);
         check("m/s^2", 1.0, Dimension::ACCELERATION);
         check("mm", 1e-3, Dimension::LENGTH);

@@ -52,7 +52,7 @@ TOO_LONG = "E0103":
 "The file is longer than the 256 MiB that are read at most.";
 UNKNOWN_UNIT = "E0104":
 "A word right after a number on the same line is read as its unit, and this one is not known. Lengths: m cm mm
-um km; time: s ms us min h; mass: kg g; force: N kN; pressure: Pa kPa MPa; energy: J kJ; angle: deg rad; rate: Hz rpm;
+um km; time: s ms us min h; mass: kg g; force: N mN kN; pressure: Pa mPa kPa MPa; energy: J kJ; angle: deg rad; rate: Hz rpm;
 combined with `/`, `·` and `^`: `kg/m^3`, `Pa·s`, `m/s^2`, `deg/s`.";
 EQUALITY = "E0105":
 "`a == b` would be a surface of zero thickness: no point is inside it, so it can neither be meshed nor hit.
@@ -203,7 +203,8 @@ LARGE_ANGLE = "W0409":
 `45 rad` if radians are meant.";
 CONSTANT_SOLID = "W0410":
 "The solid does not depend on x, y or z: it is all of space if its value is positive, and empty otherwise. A solid is an
-inequality such as `x² + y² <= 1 and 0 <= z <= 1`, or a standard solid such as `sphere(1)`.";
+inequality such as `x² + y² <= 1 and 0 <= z <= 1`, or a standard solid such as `sphere(1)`. The same holds for an operand of
+`and`, `or` or `\\` that is a number: `x <= 1 or 2` is all of space.";
 SHAPES_AS_NUMBERS = "W0411":
 "`+`, `-`, `*` and `/` work on the values of ω, and the result is rarely a shape that someone means. Shapes are joined by
 `a or b`, cut by `a and b`, and taken away by `a \\ b`. Where the values are meant, give one of them a name with `let`.";

@@ -1,6 +1,7 @@
 //! Calls: arguments are bound to parameters, then the body is evaluated in a scope of its own.
 
 use super::builtins;
+use super::foreign;
 use super::lowering::{Call, Local, Lowering, Scope};
 use super::names::Kind;
 use super::value::Value;
@@ -209,10 +210,15 @@ impl<'a> Lowering<'a> {
         }
         let message = format!("`{}` has no parameter `{}`", function.name.text, given.text);
         let all: Vec<&str> = names.clone().collect();
-        let diagnostic = Diagnostic::error(Code::ARGUMENTS, given.span, message)
-            .help(format!("its parameters are {}", all.join(", ")))
-            .suggest(&given.text, names);
-        self.report(diagnostic);
+        let diagnostic = Diagnostic::error(Code::ARGUMENTS, given.span, message);
+        let is_standard = self.names.is_standard(self.scope.source, &function.name.text);
+        let known = foreign::parameter(&function.name.text, &given.text, &all).filter(|_| is_standard);
+        self.report(match known {
+            Some(help) => diagnostic.help(help),
+            None => {
+                diagnostic.help(format!("its parameters are {}", all.join(", "))).suggest(&given.text, names)
+            }
+        });
         Parameter::Unknown
     }
 

@@ -376,6 +376,7 @@ impl Lowering<'_> {
         let nodes: Vec<Option<Node>> = operands.iter().map(|operand| self.field(operand)).collect();
         let Some(mut nodes) = nodes.into_iter().collect::<Option<Vec<Node>>>() else { return Value::Failed };
         self.warn_of_twins(op, operands, &nodes);
+        self.warn_of_numbers(op, operands, &nodes);
         if op == Logic::Minus {
             for node in &mut nodes[1..] {
                 *node = self.unary(Unary::Neg, *node, span);

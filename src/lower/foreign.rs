@@ -83,6 +83,9 @@ pub(super) fn value(name: &str) -> Option<&'static str> {
         "inf" | "Inf" | "infinity" | "Infinity" | "INFINITY" | "nan" | "NaN" => {
             "numbers are finite: a half-space such as `x <= 1` has no end either"
         }
+        "off" | "Off" | "none" | "no" | "on" => {
+            "there are no switches, only numbers: `gravity: [0, 0, 0]` is no gravity, and `viscosity: 0` no viscosity"
+        }
         "p" | "P" | "pos" | "position" | "uv" => "write `[x, y, z]`",
         "if" | "then" | "else" => foreign::CONDITION,
         "path" | "polyline" | "bezier" | "curve" | "contour" | "outline" => CURVES,
@@ -91,6 +94,35 @@ pub(super) fn value(name: &str) -> Option<&'static str> {
         "s2" => "a power of a unit has a sign, as in `9.81 m/s^2`",
         _ => return None,
     })
+}
+
+/// The help for a named argument that other tools have; `None` if the name is not known from there.
+pub(super) fn parameter(function: &str, given: &str, parameters: &[&str]) -> Option<String> {
+    let called = |name: &str| {
+        let has = parameters.contains(&name);
+        has.then(|| {
+            format!("`{given}` is called `{name}` here; its parameters are {}", parameters.join(", "))
+        })
+    };
+    match given {
+        "d" | "diameter" | "dia" => parameters.contains(&"r").then(|| {
+            format!("its radius is `r`, half of `{given}`; its parameters are {}", parameters.join(", "))
+        }),
+        "r1" | "r2" | "rtop" | "rbottom" | "d1" | "d2" if matches!(function, "cylinder" | "cone") => Some(
+            "a cone that does not end in a point is a cylinder made narrower upwards: write for example \
+             `cylinder(2, 3).taper(3, 0.5)`, which is half as wide at its top"
+                .to_string(),
+        ),
+        "radius" => called("r"),
+        "height" | "length" | "l" => called("h"),
+        "center" | "origin" => called("centre").or_else(|| called("point")),
+        "r1" | "R1" => called("R"),
+        "r2" => called("r"),
+        "n" => called("normal"),
+        "lo" | "lower" | "low" | "from" => called("min"),
+        "hi" | "upper" | "high" | "to" => called("max"),
+        _ => None,
+    }
 }
 
 /// The words for outlines and paths.

@@ -128,7 +128,14 @@ impl Lowering<'_> {
         let (start, end) = (start?, end?);
         if start.fract() != 0.0 || end.fract() != 0.0 {
             let message = format!("a range goes from one whole number to another, found {start} .. {end}");
-            self.report(Diagnostic::error(Code::OUT_OF_RANGE, whole, message));
+            let diagnostic = Diagnostic::error(Code::OUT_OF_RANGE, whole, message);
+            let dots = self.written_at(whole).filter(|text| text.contains("..."));
+            self.report(match dots {
+                Some(text) => {
+                    diagnostic.help(format!("a range has two dots: write `{}`", text.replace("...", "..")))
+                }
+                None => diagnostic,
+            });
             return None;
         }
         if start >= end && !matches!(op, Fold::Sum | Fold::Product) {
@@ -198,6 +205,7 @@ impl Lowering<'_> {
             return Value::Number(self.constant(if op == Fold::Product { 1.0 } else { 0.0 }));
         };
         if op == Fold::Sum {
+            self.warn_of_sum(body, span);
             return rest.iter().fold(first.clone(), |sum, next| self.sum(Binary::Add, &sum, next, span));
         }
         let nodes: Option<Vec<Node>> =

@@ -154,8 +154,13 @@ impl Lowering<'_> {
     /// What the user wrote for an expression, if a message can repeat it: it stands in the file, on one line, and is
     /// short.
     pub fn written(&self, expr: &Expr) -> Option<&str> {
+        self.written_at(expr.span)
+    }
+
+    /// The text of a place in the user's file, if a message may quote it.
+    pub fn written_at(&self, span: Span) -> Option<&str> {
         const LONGEST: usize = 60;
-        let text = self.text.get(expr.span.range()).filter(|_| expr.span.source == SourceId::File)?;
+        let text = self.text.get(span.range()).filter(|_| span.source == SourceId::File)?;
         let fits =
             !text.is_empty() && text.len() <= LONGEST && !text.contains(|c: char| c.is_control() || c == '`');
         fits.then_some(text)

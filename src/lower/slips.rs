@@ -5,7 +5,7 @@ use rustc_hash::FxHashMap;
 
 use super::lowering::Lowering;
 use super::names::{Kind, TIME};
-use crate::diagnostic::{Code, Diagnostic, SourceId};
+use crate::diagnostic::{Code, Diagnostic, SourceId, Span};
 use crate::ir::{Binary, Node};
 use crate::quantity::{Dimension, parse_unit};
 use crate::syntax::ast::{Expr, ExprKind, Fold, Logic};
@@ -119,7 +119,42 @@ impl Lowering<'_> {
         );
     }
 
-    /// Whether an expression is written as a shape: a standard solid, a moved one, a solid's name, or shapes joined.
+    /// Warns of `sum` over shapes, as in `sum i in 0..3: sphere(1).move([i, 0, 0])`.
+    pub fn warn_of_sum(&mut self, body: &Expr, fold: Span) {
+        if self.is_shape(body) {
+            let message = "`sum` adds the values of shapes; it does not join them";
+            let joined = match self.written_at(fold) {
+                Some(text) => text.replacen("sum", "any", 1),
+                None => "any i in 0..6: …".to_string(),
+            };
+            self.report(
+                Diagnostic::warning(Code::SHAPES_AS_NUMBERS, body.span, message)
+                    .help(format!("to join them, write `{joined}`")),
+            );
+        }
+    }
+
+    /// Warns of the first operand of `and`, `or` or `\\` that is a number, as in `x <= 1 or 2`.
+    pub fn warn_of_numbers(&mut self, op: Logic, operands: &[Expr], nodes: &[Node]) {
+        let is_number =
+            |expr: &Expr| matches!(without_sign(expr).kind, ExprKind::Number(_) | ExprKind::Quantity { .. });
+        let mut pairs = std::iter::zip(operands, nodes);
+        let Some((operand, node)) = pairs.find(|(expr, _)| is_number(expr) && expr.span.source.is_users())
+        else {
+            return;
+        };
+        let Some(constant) = self.known_value(*node) else { return };
+        let holds = if constant > 0.0 { "holds all of space" } else { "is empty" };
+        let message =
+            format!("an operand of `{}` is the number {constant}: as a shape it {holds}", op.word());
+        self.report(
+            Diagnostic::warning(Code::CONSTANT_SOLID, operand.span, message)
+                .help("each operand is a whole shape or comparison, as in `x <= 1 or x >= 2`"),
+        );
+    }
+
+    /// Whether an expression is written as a shape: a standard solid, a moved one, a solid's name, a comparison, or shapes
+    /// joined.
     fn is_shape(&mut self, expr: &Expr) -> bool {
         if expr.span.source != SourceId::File {
             return false;
@@ -135,13 +170,15 @@ impl Lowering<'_> {
                 let global = self.names.get(self.scope.source, name);
                 !is_local && global.is_some_and(|g| matches!(g.kind, Kind::Solid(_)))
             }
-            ExprKind::Method { .. } | ExprKind::Logic { .. } | ExprKind::Not(_) => true,
+            ExprKind::Method { .. }
+            | ExprKind::Logic { .. }
+            | ExprKind::Not(_)
+            | ExprKind::Compare { .. } => true,
             ExprKind::Fold { op, .. } => matches!(op, Fold::Any | Fold::All),
             ExprKind::Number(_)
             | ExprKind::Quantity { .. }
             | ExprKind::Text(_)
             | ExprKind::Vector(_)
-            | ExprKind::Compare { .. }
             | ExprKind::Sum { .. }
             | ExprKind::Product { .. }
             | ExprKind::Negate(_)

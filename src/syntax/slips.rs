@@ -95,6 +95,9 @@ impl<'t> Slip<'t> {
                 return diagnostic;
             }
         }
+        if matches!(last_word(line), "NOT" | "Not") {
+            return Some(self.syntax("there is no operator `NOT`").help("write `not a`"));
+        }
         if last_word(line) == "for" {
             return Some(
                 self.unexpected().at("`for` is written `any` here").help("write `any i in 0..6: …`"),
@@ -267,6 +270,16 @@ impl<'t> Slip<'t> {
         Some(Diagnostic::error(Code::EQUALITY, self.span, "`=` does not compare").help(help))
     }
 
+    /// `1'000`
+    fn grouped_digits(&self) -> Diagnostic {
+        let behind = self.after();
+        let end =
+            behind.find(|c: char| !(c.is_ascii_digit() || c == '\'' || c == '.')).unwrap_or(behind.len());
+        let digits: String = behind[..end].chars().filter(|c| *c != '\'').collect();
+        let number = last_number(self.before());
+        self.unexpected().help(format!("digits are not grouped: write `{number}{digits}`"))
+    }
+
     /// `0..=5`
     fn closed_range(&self, start: &str) -> Diagnostic {
         let end = last_number_or_word(&self.after()[..token_end(self.after())]);
@@ -355,7 +368,13 @@ impl<'t> Slip<'t> {
                     self.syntax("the text is not closed").help("a text ends with `\"` on its own line"),
                 );
             }
+            "'" if number_ends(before) && after.starts_with(|c: char| c.is_ascii_digit()) => {
+                return Some(self.grouped_digits());
+            }
             "'" | "“" | "”" | "„" | "«" | "‘" => "a text stands in double quotes: `\"…\"`",
+            "∪" => "shapes are joined by `or` or `∨`: write `a or b`",
+            "∩" => "shapes are cut by `and` or `∧`: write `a and b`",
+            "√" => "a root is written `sqrt(2)`",
             "%" if number_ends(before) => "a percentage is written as a number: `0.1` for 10 %",
             "%" => foreign::REMAINDER,
             "?" => foreign::CONDITION,

@@ -72,14 +72,23 @@ impl Slip<'_> {
     /// `viscosity: 1 cP }`, `1000 kg m^-3`: what follows the number is no unit, or goes on behind one, so the grammar takes
     /// it for the next key.
     pub(super) fn unit_taken_for_a_key(&self) -> Option<Diagnostic> {
-        let line = self.on_its_line().trim_end();
+        // the next word or bracket may stand on a line of its own, and a `:` behind that word
+        let before = self.before();
+        let before = match self.found {
+            ":" => {
+                before.strip_suffix(last_word(before)).filter(|rest| rest.ends_with([' ', '\n']))?.trim_end()
+            }
+            _ => before,
+        };
+        let line_start = before.rfind('\n').map_or(self.start.min(self.at), |n| self.start + n + 1);
+        let line = before.get(line_start.saturating_sub(self.start)..)?;
         let word = last_word(line);
-        if !self.in_braces() || matches!(self.found, ":" | "{" | "=" | "[") || word.is_empty() {
+        if !self.in_braces() || matches!(self.found, "{" | "=" | "[") || word.is_empty() {
             return None;
         }
-        let line_start = self.at - self.on_its_line().len();
         let value_start = line.rfind([':', ',', '[', '{', '='])? + 1;
-        let value = self.text[line_start + value_start..].lines().next().unwrap_or_default();
+        let end = if self.found == ":" { line_start + line.len() } else { self.text.len() };
+        let value = self.text[line_start + value_start..end].lines().next().unwrap_or_default();
         let value = value.split([',', '}', ']', ')', '#', ';']).next().unwrap_or_default().trim_end();
         let number = value.len() - value.trim_start().trim_start_matches('-').len();
         let number_length = number_at(&value[number..]);
