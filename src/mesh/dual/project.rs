@@ -80,32 +80,44 @@ pub(super) fn along(
         far = (outwards * reach, omega(outwards * reach));
         reach *= 2.0;
     }
-    // regula falsi; the end that stays counts half (Illinois), and every third step is a bisection
-    for step in 0..BRACKETED {
-        if (far.0 - near.0).abs() <= f64::EPSILON * size {
-            break;
-        }
-        let share = near.1 / (near.1 - far.1);
-        let share = if step % 3 == 2 || !(0.0..=1.0).contains(&share) { 0.5 } else { share };
-        let t = near.0 + share * (far.0 - near.0);
-        if t == near.0 || t == far.0 {
-            break;
-        }
-        let found = (t, omega(t));
-        if (found.1 > 0.0) == inside {
-            near = found;
-            far.1 *= 0.5;
-        } else {
-            far = found;
-            near.1 *= 0.5;
-        }
-    }
-    // the values may have been halved
-    let ends = [near.0, far.0].map(|t| (omega(t).abs(), t));
-    let t = if ends[0].0 <= ends[1].0 { ends[0].1 } else { ends[1].1 };
+    let t = root(omega, near, far, f64::EPSILON * size);
     *count += 1;
     let point = start + t * normal;
     Some(FacePoint { point, normal: unit(-field.omega_grad(point).1)? })
+}
+
+/// Where a function changes its sign between two places with values of unlike sign, within a tolerance.
+///
+/// Inverse quadratic interpolation where the last three places bend little enough for it, and bisection elsewhere
+/// (Chandrupatla 1997): a smooth ω takes about eight values, and one that jumps hardly more than bisection does.
+fn root(mut omega: impl FnMut(f64) -> f64, near: (f64, f64), far: (f64, f64), tolerance: f64) -> f64 {
+    // the root lies between the last place and the other one; the third is the one that was left
+    let (mut last, mut other) = (far, near);
+    let mut nearest = if far.1.abs() < near.1.abs() { far } else { near };
+    let mut share = 0.5;
+    for _ in 0..BRACKETED {
+        let t = last.0 + share * (other.0 - last.0);
+        let found = (t, omega(t));
+        let third =
+            if (found.1 > 0.0) == (last.1 > 0.0) { last } else { std::mem::replace(&mut other, last) };
+        last = found;
+        nearest = if last.1.abs() < other.1.abs() { last } else { other };
+        let least = tolerance / (other.0 - last.0).abs();
+        if nearest.1 == 0.0 || least > 0.5 {
+            break;
+        }
+        let place = (last.0 - other.0) / (third.0 - other.0);
+        let value = (last.1 - other.1) / (third.1 - other.1);
+        share = if value.powi(2) < place && (1.0 - value).powi(2) < 1.0 - place {
+            let by_other = last.1 / (other.1 - last.1) * third.1 / (other.1 - third.1);
+            let by_third = last.1 / (third.1 - last.1) * other.1 / (third.1 - other.1);
+            by_other + (third.0 - last.0) / (other.0 - last.0) * by_third
+        } else {
+            0.5
+        };
+        share = if share.is_nan() { 0.5 } else { share.clamp(least, 1.0 - least) };
+    }
+    nearest.0
 }
 
 /// The surface within `size` of `start` where it faces about as `normal` does. `None` if no such point
