@@ -28,23 +28,34 @@ pub enum Part {
 /// A tree of faces in prefix order: each node is followed by its parts. It is empty if no surface is near.
 pub type Faces = SmallVec<[Part; 16]>;
 
-/// The faces of a tree that a body outside may touch: all parts of unions, and of an intersection the one of which it is
-/// farthest.
+/// The faces of a tree that a body outside may touch: all parts of unions, and of an intersection those of the part of which
+/// it is farthest.
 pub(crate) fn standing_faces(faces: &[Part]) -> SmallVec<[Face; 8]> {
-    /// Adds those of the tree that begins at a part, and returns where the next one begins.
-    fn of_tree(faces: &[Part], at: usize, found: &mut SmallVec<[Face; 8]>) -> usize {
-        let Some(part) = faces.get(at) else { return at };
+    /// Adds those of the tree that begins at a part. Returns how far the body is from that tree, and where the next one begins.
+    fn of_tree(faces: &[Part], at: usize, found: &mut SmallVec<[Face; 8]>) -> (f64, usize) {
+        let Some(part) = faces.get(at) else { return (f64::INFINITY, at) };
         match *part {
             Part::Face(face) => {
                 found.push(face);
-                at + 1
+                (face.distance, at + 1)
             }
-            Part::Any(parts) => (0..parts).fold(at + 1, |next, _| of_tree(faces, next, found)),
+            Part::Any(parts) => (0..parts).fold((f64::INFINITY, at + 1), |(nearest, next), _| {
+                let (distance, next) = of_tree(faces, next, found);
+                (nearest.min(distance), next)
+            }),
             Part::All(parts) => {
-                let mut within = SmallVec::new();
-                let end = (0..parts).fold(at + 1, |next, _| of_tree(faces, next, &mut within));
-                found.extend(within.into_iter().max_by(|a, b| a.distance.total_cmp(&b.distance)));
-                end
+                let (mut farthest, mut next) = (f64::NEG_INFINITY, at + 1);
+                let mut chosen = SmallVec::new();
+                for _ in 0..parts {
+                    let mut within = SmallVec::new();
+                    let distance;
+                    (distance, next) = of_tree(faces, next, &mut within);
+                    if distance >= farthest {
+                        (farthest, chosen) = (distance, within);
+                    }
+                }
+                found.extend(chosen);
+                (farthest, next)
             }
         }
     }
@@ -74,4 +85,25 @@ pub(crate) fn surface_face(faces: &[Part]) -> Option<Face> {
         Some(chosen)
     }
     of_tree(faces, &mut 0)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Below a cup a body touches its underside, however near the wall of its hollow is: it is behind the hollow's floor.
+    #[test]
+    fn of_a_cup_the_underside_stands_before_a_body_below() {
+        let face = |distance: f64, normal: DVec3| Part::Face(Face { distance, normal, mean_curvature: 0.0 });
+        let cup = [
+            Part::All(2),
+            face(0.01, -DVec3::Z),
+            Part::Any(2),
+            face(0.027, -DVec3::X),
+            face(-0.07, DVec3::Z),
+        ];
+        let found = standing_faces(&cup);
+        assert_eq!(found.iter().map(|face| face.distance).collect::<Vec<_>>(), [0.01]);
+        assert_eq!(surface_face(&cup).map(|face| face.distance), Some(0.01));
+    }
 }

@@ -185,8 +185,9 @@ fn move_out(
                 p += (wanted - face.distance) * face.normal;
             }
         }
+        // what an obstacle would move out of the box stays, unless the two leave it no room
         let at = if domain.contains(p) { p } else { start };
-        let slot = if at == start { None } else { slot(at, domain, obstacles, 2.0 * clearance) };
+        let slot = if p == start { None } else { slot(at, domain, obstacles, 2.0 * clearance) };
         match slot {
             None => kept.push(at, particles.velocity.get(i)),
             Some(slot) if slot.width < LEAST_SLOT * 2.0 * clearance => {}
