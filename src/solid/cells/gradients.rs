@@ -6,15 +6,6 @@ use super::map::{CellMap, RUN, signed};
 use crate::field::{Field, GradientsMut, Points};
 use crate::solid::leaves::words::Word;
 
-/// Where a point's program is: in the map's cells, or in what knows more of their surroundings.
-#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-enum Source {
-    Cells,
-    Around,
-    /// No cell answers, but all leaves do.
-    Twin,
-}
-
 /// Some points, gathered in columns.
 pub(super) struct Gathered {
     x: [f64; RUN],
@@ -56,48 +47,40 @@ impl CellMap {
         let mut gathered = Gathered::EMPTY;
         for first in (0..points.len()).step_by(RUN) {
             let count = RUN.min(points.len() - first);
-            let mut keys = [(Source::Twin, 0, 0); RUN];
+            // points of one tree come together by where it lies in the memory; those of none come first
+            let mut keys = [(None, 0); RUN];
             for (k, key) in keys[..count].iter_mut().enumerate() {
-                let (source, program) = self.program_at(points, first + k);
-                *key = (source, program, first + k);
+                *key = (self.words_for(points.get(first + k)).map(<[u32]>::as_ptr), first + k);
             }
             let keys = &mut keys[..count];
             keys.sort_unstable();
-            for group in keys.chunk_by(|a, b| (a.0, a.1) == (b.0, b.1)) {
-                let (words, begin) = match group[0].0 {
-                    Source::Cells => (&self.cells.programs[..], group[0].1),
-                    Source::Around => (self.words_around(group[0].1), 0),
-                    Source::Twin => {
-                        for &(.., i) in group {
-                            let (omega, gradient) = self.twin.omega_grad(points.get(i));
-                            (out.omega[i], out.x[i], out.y[i], out.z[i]) =
-                                (omega, gradient.x, gradient.y, gradient.z);
-                        }
-                        continue;
+            for group in keys.chunk_by(|a, b| a.0 == b.0) {
+                let numbers = group.iter().map(|key| key.1);
+                let Some(words) = self.words_for(points.get(group[0].1)) else {
+                    // no cell answers, but all leaves do
+                    for i in numbers {
+                        let (omega, gradient) = self.twin.omega_grad(points.get(i));
+                        (out.omega[i], out.x[i], out.y[i], out.z[i]) =
+                            (omega, gradient.x, gradient.y, gradient.z);
                     }
+                    continue;
                 };
-                gathered.fill(points, group.iter().map(|key| key.2));
-                self.gradients_of((words, begin), &gathered, group.iter().map(|key| key.2), &mut out);
+                gathered.fill(points, numbers.clone());
+                self.gradients_of(words, &gathered, numbers, &mut out);
             }
         }
     }
 
-    fn program_at(&self, points: Points<'_>, i: usize) -> (Source, u32) {
-        self.program_for(points.get(i)).map_or((Source::Twin, 0), |(is_around, program)| {
-            (if is_around { Source::Around } else { Source::Cells }, program)
-        })
-    }
-
-    /// ω and ∇ω at the gathered points, by one program, for the points of these numbers.
+    /// ω and ∇ω at the gathered points, by one tree, for the points of these numbers.
     fn gradients_of(
         &self,
-        (words, program): (&[u32], u32),
+        words: &[u32],
         points: &Gathered,
         numbers: impl Iterator<Item = usize> + Clone,
         out: &mut GradientsMut<'_>,
     ) {
         let mut decided = Decided::NONE;
-        self.decide_many(words, &mut (program as usize), points, &mut decided);
+        self.decide_many(words, &mut 0, points, &mut decided);
         for (value, i) in decided.values.iter().zip(numbers.clone()) {
             out.omega[i] = *value;
         }

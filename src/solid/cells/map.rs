@@ -14,7 +14,8 @@ use std::sync::Arc;
 use glam::DVec3;
 
 use super::demanded::{Demanded, Keeps};
-use super::grid::{Cell, Cells, Found, SIDE, judged};
+use super::grid::{Cells, SIDE, judged};
+use super::window::{Found, Known, Window};
 use crate::field::{
     Entry, Faces, Field, GradientsMut, Normals, Path, Points, Sheet, Walls, clearance_by_ranges,
 };
@@ -58,7 +59,7 @@ pub struct CellMap {
     solid: Solid,
     pub(super) twin: Twin,
     pub(super) parts: Arc<LeafTree>,
-    pub(super) cells: Arc<Cells>,
+    pub(super) cells: Arc<Window>,
     /// What decides within [`AROUND`] of the cells, for gradients off the surface.
     around: Demanded,
     /// What decides the value in the cells.
@@ -123,23 +124,24 @@ impl CellMap {
         }
         let parts = solid.parts()?;
         let margin = margin(&domain, reach);
-        let cells = Arc::new(Cells::new(&parts, domain, margin));
-        Self::of(solid, cells, reach)
+        let cells = Cells::new(&parts, domain, margin);
+        Self::of(solid, Arc::new(Window::at_rest(cells, parts, margin)), reach)
     }
 
     /// A map of cells that are right for the solid's stretch of time, and were grown by [`margin`].
-    pub(super) fn of(solid: &Solid, cells: Arc<Cells>, reach: f64) -> Option<Self> {
-        let (parts, margin) = (solid.parts()?, margin(&cells.domain, reach));
-        let beside = AROUND * cells.domain.size().max_element() / f64::from(SIDE);
-        let around = Demanded::new(cells.domain, Keeps::Surface, beside.max(margin));
-        let deciding = Demanded::new(cells.domain, Keeps::Value, margin);
+    pub(super) fn of(solid: &Solid, cells: Arc<Window>, reach: f64) -> Option<Self> {
+        let domain = cells.domain();
+        let (parts, margin) = (solid.parts()?, margin(&domain, reach));
+        let beside = AROUND * domain.size().max_element() / f64::from(SIDE);
+        let around = Demanded::new(domain, Keeps::Surface, beside.max(margin));
+        let deciding = Demanded::new(domain, Keeps::Value, margin);
         let (solid, twin) = (solid.clone(), solid.twin());
         Some(Self { solid, twin, parts, cells, around, deciding, reach, margin })
     }
 
-    /// How the box was divided.
+    /// How the box is divided. Cells in which something moves are divided for that, as if all of them were asked for.
     pub fn stats(&self) -> CellStats {
-        let (leaves, counts) = (&self.parts.leaves, self.cells.counts);
+        let (leaves, counts) = (&self.parts.leaves, self.cells.counts());
         CellStats {
             leaves: leaves.len(),
             shapes: leaves.shapes(),
@@ -154,8 +156,8 @@ impl CellMap {
     /// What is known of a place; [`Place::Near`] for points outside the box.
     pub fn place_of(&self, p: DVec3) -> Place {
         match self.cells.find(p).map(|found| found.cell) {
-            Some(Cell::Fluid) => Place::Fluid,
-            Some(Cell::Inside) => Place::Inside,
+            Some(Known::Fluid) => Place::Fluid,
+            Some(Known::Inside) => Place::Inside,
             _ => Place::Near,
         }
     }
@@ -165,9 +167,9 @@ impl CellMap {
     #[inline]
     pub fn sign(&self, p: DVec3) -> f64 {
         match self.cells.find(p).map(|found| found.cell) {
-            Some(Cell::Fluid) => -1.0,
-            Some(Cell::Inside) => 1.0,
-            Some(Cell::Near(program)) => Unary::Sign.eval(self.run(program, p).0),
+            Some(Known::Fluid) => -1.0,
+            Some(Known::Inside) => 1.0,
+            Some(Known::Near(words)) => Unary::Sign.eval(self.run(words, p).0),
             _ => self.solid.sign(p),
         }
     }
@@ -191,9 +193,9 @@ impl CellMap {
         let beyond =
             |sign: f64| Contact { distance: sign * f64::INFINITY, normal: DVec3::ZERO, mean_curvature: 0.0 };
         let found = match self.cells.find(p).map(|found| found.cell) {
-            Some(Cell::Fluid) => return beyond(1.0),
-            Some(Cell::Inside) => return beyond(-1.0),
-            Some(Cell::Near(program)) => self.nearest(&mut (program as usize), p).contact(),
+            Some(Known::Fluid) => return beyond(1.0),
+            Some(Known::Inside) => return beyond(-1.0),
+            Some(Known::Near(words)) => self.nearest(words, &mut 0, p).contact(),
             _ => self.solid.contact(p),
         };
         if found.distance.abs() >= self.reach { beyond(found.distance.signum()) } else { found }
@@ -211,30 +213,24 @@ impl CellMap {
         }
     }
 
-    /// The value of a program at a point, and the leaf that decides.
+    /// The value of a tree at a point, and the leaf that decides.
     #[inline]
-    fn run(&self, program: u32, p: DVec3) -> (f64, (u32, bool)) {
-        self.parts.leaves.decide(&self.cells.programs, &mut (program as usize), p)
+    fn run(&self, words: &[u32], p: DVec3) -> (f64, (u32, bool)) {
+        self.parts.leaves.decide(words, &mut 0, p)
     }
 
-    /// The program that gives the gradient at a point: where it begins in the cells' programs, or the number of a cell
-    /// of the [surroundings](Self::words_around) if `true` stands before it. `None` far from all surfaces and outside the
-    /// box.
+    /// What gives the gradient at a point: the tree of its cell, or what decides around it. `None` far from all surfaces and
+    /// outside the box.
     #[inline]
-    pub(super) fn program_for(&self, p: DVec3) -> Option<(bool, u32)> {
+    pub(super) fn words_for(&self, p: DVec3) -> Option<&[u32]> {
         match self.cells.find(p)?.cell {
-            Cell::Near(program) => Some((false, program)),
+            Known::Near(words) => Some(words),
             // surroundings of their own for each stretch of time do not pay
             _ if self.solid.moves() => None,
-            Cell::Fluid | Cell::Inside | Cell::Divided(_) => {
-                self.around.find(&self.parts, p).map(|cell| (true, cell))
+            Known::Fluid | Known::Inside => {
+                self.around.find(&self.parts, p).map(|cell| self.around.words(&self.parts, cell))
             }
         }
-    }
-
-    /// What decides within [`AROUND`] of a cell.
-    pub(super) fn words_around(&self, cell: u32) -> &[u32] {
-        self.around.words(&self.parts, cell)
     }
 
     /// The value of a tree at up to [`RUN`] points; `factor` is what a leaf's value is multiplied by.
@@ -271,10 +267,10 @@ impl CellMap {
         }
     }
 
-    /// The surface nearest to a point, as a program says: the distance to "all of" is the largest, to "any
+    /// The surface nearest to a point, as a tree says: the distance to "all of" is the largest, to "any
     /// of" the smallest.
-    fn nearest(&self, at: &mut usize, p: DVec3) -> Nearest {
-        let word = Word::read(self.cells.programs[*at]);
+    fn nearest(&self, words: &[u32], at: &mut usize, p: DVec3) -> Nearest {
+        let word = Word::read(words[*at]);
         *at += 1;
         let (parts, all) = match word {
             Word::Leaf { leaf, negated } => {
@@ -283,9 +279,9 @@ impl CellMap {
             Word::All(parts) => (parts, true),
             Word::Any(parts) => (parts, false),
         };
-        let mut best = self.nearest(at, p);
+        let mut best = self.nearest(words, at, p);
         for _ in 1..parts {
-            let next = self.nearest(at, p);
+            let next = self.nearest(words, at, p);
             let wins = if all { next.distance > best.distance } else { next.distance < best.distance };
             if wins || next.distance.is_nan() {
                 best = next;
@@ -298,7 +294,7 @@ impl CellMap {
 
     /// The value at many points: `free` gives its magnitude where there is no surface, from the cell's depth.
     fn evaluate(&self, points: Points<'_>, omega: &mut [f64], free: impl Fn(u32) -> f64) {
-        let mut found: [Option<Found>; RUN] = [None; RUN];
+        let mut found: [Option<Found<'_>>; RUN] = [None; RUN];
         for first in (0..points.len()).step_by(RUN) {
             let count = RUN.min(points.len() - first);
             for (k, found) in found[..count].iter_mut().enumerate() {
@@ -311,21 +307,20 @@ impl CellMap {
                     k += 1;
                     continue;
                 };
-                let Cell::Near(program) = cell else {
-                    omega[first + k] = if cell == Cell::Inside { free(depth) } else { -free(depth) };
+                let Known::Near(words) = cell else {
+                    omega[first + k] = if matches!(cell, Known::Inside) { free(depth) } else { -free(depth) };
                     k += 1;
                     continue;
                 };
-                let same = |other: &&Option<Found>| other.is_some_and(|other| other.place == place);
+                let same = |other: &&Option<Found<'_>>| other.is_some_and(|other| other.place == place);
                 let length = found[k..count].iter().take_while(same).count();
                 let run = first + k..first + k + length;
                 if length >= SHORTEST_RUN {
                     let columns = [points.x, points.y, points.z].map(|c| &c[run.clone()]);
-                    let (words, out) = (&self.cells.programs[..], &mut omega[run]);
-                    self.run_many(words, &mut (program as usize), columns, &|_| 1.0, out);
+                    self.run_many(words, &mut 0, columns, &|_| 1.0, &mut omega[run]);
                 } else {
                     for i in run {
-                        omega[i] = self.run(program, points.get(i)).0;
+                        omega[i] = self.run(words, points.get(i)).0;
                     }
                 }
                 k += length;
@@ -337,10 +332,9 @@ impl CellMap {
     fn stays_out(&self, path: &Path) -> bool {
         match (self.cells.find(path.from), self.cells.find(path.to)) {
             (Some(from), Some(to)) if from.place == to.place => match from.cell {
-                Cell::Near(program) => {
-                    Sweep::new(&self.parts.leaves, path).stays_out(&self.cells.programs[program as usize..])
-                }
-                cell => cell == Cell::Fluid,
+                Known::Near(words) => Sweep::new(&self.parts.leaves, path).stays_out(words),
+                Known::Fluid => true,
+                Known::Inside => false,
             },
             _ => false,
         }
@@ -359,9 +353,8 @@ impl CellMap {
             let leave = ((side - path.from) / step).to_array().into_iter().filter(|t| t.is_finite());
             let end = leave.fold(1.0, f64::min).max(t);
             match cell {
-                Cell::Inside => return Some(Entry::new(path, (t, end), true, Normals::default())),
-                Cell::Near(program) => {
-                    let words = &self.cells.programs[program as usize..];
+                Known::Inside => return Some(Entry::new(path, (t, end), true, Normals::default())),
+                Known::Near(words) => {
                     let entry = Sweep::new(&self.parts.leaves, path).first_entry(words, (t, end));
                     match entry {
                         // the border of the cell has cut off what would decide it
@@ -372,7 +365,7 @@ impl CellMap {
                         None => {}
                     }
                 }
-                Cell::Fluid | Cell::Divided(_) => {}
+                Known::Fluid => {}
             }
             if end >= 1.0 {
                 return None;
@@ -415,18 +408,16 @@ impl Nearest {
 impl Field for CellMap {
     fn omega(&self, p: DVec3) -> f64 {
         match self.cells.find(p) {
-            Some(Found { cell: Cell::Fluid, depth, .. }) => -self.cells.shortest_side(depth),
-            Some(Found { cell: Cell::Inside, depth, .. }) => self.cells.shortest_side(depth),
-            Some(Found { cell: Cell::Near(program), .. }) => self.run(program, p).0,
+            Some(Found { cell: Known::Fluid, depth, .. }) => -self.cells.shortest_side(depth),
+            Some(Found { cell: Known::Inside, depth, .. }) => self.cells.shortest_side(depth),
+            Some(Found { cell: Known::Near(words), .. }) => self.run(words, p).0,
             _ => self.twin.omega(p),
         }
     }
 
     fn omega_grad(&self, p: DVec3) -> (f64, DVec3) {
-        let Some((is_around, program)) = self.program_for(p) else { return self.twin.omega_grad(p) };
-        let (words, program) =
-            if is_around { (self.words_around(program), 0) } else { (&self.cells.programs[..], program) };
-        let (value, (leaf, negated)) = self.parts.leaves.decide(words, &mut (program as usize), p);
+        let Some(words) = self.words_for(p) else { return self.twin.omega_grad(p) };
+        let (value, (leaf, negated)) = self.run(words, p);
         let gradient = self.parts.leaves.gradient(leaf, p).1;
         (value, if negated { -gradient } else { gradient })
     }
@@ -463,13 +454,12 @@ impl Field for CellMap {
             return self.twin.sheets(over, visit);
         }
         let (mut known, mut last) = (Vec::new(), None);
-        let of_cell = &mut |cell: Cell, _: u32| -> ControlFlow<()> {
-            if let Cell::Near(program) = cell
-                && last != Some(program)
+        let of_cell = &mut |cell: Known<'_>, _: u32| -> ControlFlow<()> {
+            if let Known::Near(words) = cell
+                && last != Some(words.as_ptr())
             {
-                last = Some(program);
-                let tree = &self.cells.programs[program as usize..];
-                self.parts.leaves.sheets(tree, over, &mut known, visit);
+                last = Some(words.as_ptr());
+                self.parts.leaves.sheets(words, over, &mut known, visit);
             }
             ControlFlow::Continue(())
         };
@@ -482,7 +472,7 @@ impl Field for CellMap {
 
 impl CellMap {
     fn is_within(&self, over: &Aabb) -> bool {
-        let domain = self.cells.domain;
+        let domain = self.cells.domain();
         domain.union(over) == domain && !over.is_empty()
     }
 
@@ -493,18 +483,18 @@ impl CellMap {
             return None;
         }
         let (mut all, mut last): (Option<Interval>, _) = (None, None);
-        let of_cell = &mut |cell: Cell, depth: u32| {
+        let of_cell = &mut |cell: Known<'_>, depth: u32| {
             // what stands for ω where only its sign is known
             let free = self.cells.shortest_side(depth);
             let range = match cell {
-                Cell::Fluid => Interval::point(-free),
-                Cell::Inside => Interval::point(free),
-                Cell::Near(program) if last == Some(program) => return ControlFlow::Continue(()),
-                Cell::Near(program) => {
-                    last = Some(program);
-                    self.parts.leaves.range_of_tree(&self.cells.programs, &mut (program as usize), over)
+                Known::Fluid => Interval::point(-free),
+                Known::Inside => Interval::point(free),
+                // cells beside each other often share their words
+                Known::Near(words) if last == Some(words.as_ptr()) => return ControlFlow::Continue(()),
+                Known::Near(words) => {
+                    last = Some(words.as_ptr());
+                    self.parts.leaves.range_of_tree(words, &mut 0, over)
                 }
-                Cell::Divided(_) => Interval::ALL,
             };
             let hull = all.map_or(range, |all| all.hull(range));
             all = Some(hull);
@@ -524,10 +514,10 @@ impl Walls for CellMap {
     /// The map knows no face that is farther away than its own reach.
     fn faces(&self, p: DVec3, reach: f64, faces: &mut Faces) {
         match self.cells.find(p).map(|found| found.cell) {
-            Some(Cell::Near(program)) => {
-                self.parts.leaves.add_faces(&self.cells.programs, program as usize, p, reach, faces);
+            Some(Known::Near(words)) => {
+                self.parts.leaves.add_faces(words, 0, p, reach, faces);
             }
-            Some(Cell::Fluid) => {}
+            Some(Known::Fluid) => {}
             _ => self.parts.leaves.add_faces(&self.parts.words, 0, p, reach, faces),
         }
     }
@@ -544,24 +534,22 @@ impl Walls for CellMap {
             return twist.at(p);
         }
         match self.cells.find(p).map(|found| found.cell) {
-            Some(Cell::Near(program)) => {
-                self.nearest(&mut (program as usize), p).velocity(&self.parts.leaves, p)
-            }
+            Some(Known::Near(words)) => self.nearest(words, &mut 0, p).velocity(&self.parts.leaves, p),
             _ => self.solid.wall_velocity(p),
         }
     }
 
     fn clearance(&self, p: DVec3, most: f64) -> f64 {
         match self.cells.find(p).map(|found| found.cell) {
-            Some(Cell::Fluid) if most <= self.reach => most,
-            Some(Cell::Fluid) => clearance_by_ranges(self, p, most).max(self.reach),
-            Some(Cell::Near(program)) => {
+            Some(Known::Fluid) if most <= self.reach => most,
+            Some(Known::Fluid) => clearance_by_ranges(self, p, most).max(self.reach),
+            Some(Known::Near(words)) => {
                 // a cube around the point, with its corners at the surface's distance, or with less than half
                 // of that; what the cell has kept is right within the reach
-                let distance = self.nearest(&mut (program as usize), p).distance.min(self.reach);
+                let distance = self.nearest(words, &mut 0, p).distance.min(self.reach);
                 let is_proven = |radius: f64| {
                     let cube = Aabb::new(p, p).grown(radius);
-                    self.parts.leaves.is_negative(&self.cells.programs[program as usize..], &cube)
+                    self.parts.leaves.is_negative(words, &cube)
                 };
                 let radii = [0.57, 0.25].map(|part| (part * distance).min(most));
                 radii.into_iter().find(|&radius| radius > 0.0 && is_proven(radius)).unwrap_or(0.0)
@@ -571,7 +559,7 @@ impl Walls for CellMap {
     }
 
     fn is_far(&self, over: &Aabb, reach: f64) -> bool {
-        let domain = self.cells.domain;
+        let domain = self.cells.domain();
         if !(domain.contains(over.min) && domain.contains(over.max)) {
             return self.twin.is_far(over, reach);
         }
@@ -579,7 +567,7 @@ impl Walls for CellMap {
     }
 
     fn first_entry(&self, path: &Path) -> Option<Entry> {
-        let domain = self.cells.domain;
+        let domain = self.cells.domain();
         if domain.contains(path.from) && domain.contains(path.to) {
             if self.stays_out(path) { None } else { self.walk(path) }
         } else {

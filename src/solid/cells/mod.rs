@@ -6,4 +6,6 @@ mod gradients;
 pub mod grid;
 pub mod map;
 pub mod moving;
+mod restless;
 mod values;
+mod window;

@@ -2,8 +2,8 @@
 //!
 //! Ranges over a cell *and a stretch of time* judge a cell for all of that time. For the whole run this
 //! settles the cells that the solid never comes near, those that it never leaves, and those in which nothing
-//! but parts at rest matters. The others are divided anew for each *window* of time, a stretch of some steps;
-//! in between a step costs what it costs with a solid at rest.
+//! but parts at rest matters. The others are divided anew for each *window* of time, a stretch of some steps, as far as
+//! somebody asks for them; in between a step costs what it costs with a solid at rest.
 //!
 //! Windows begin at whole multiples of their length, so that an answer does not depend on the steps before.
 
@@ -11,6 +11,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 
 use super::grid::{Cells, Pending};
 use super::map::{CellMap, CellStats, margin};
+use super::window::Window;
 use crate::field::{Moving, Walls};
 use crate::geom::{Aabb, Placement};
 use crate::solid::construction::Solid;
@@ -19,12 +20,12 @@ use crate::solid::construction::Solid;
 pub struct MovingMap {
     solid: Solid,
     /// Right for the whole run, except in the cells that are `restless`.
-    lasting: Cells,
-    restless: Vec<Pending>,
+    lasting: Arc<Cells>,
+    restless: Arc<[Pending]>,
     reach: f64,
     run: (f64, f64),
     window: f64,
-    current: Mutex<Option<(u64, Arc<Cells>)>>,
+    current: Mutex<Option<(u64, Arc<Window>)>>,
 }
 
 /// A window also holds this part of the next one, so that a step which begins in it ends in it.
@@ -50,6 +51,7 @@ impl MovingMap {
         }
         let parts = solid.between(run.0 - window, run.1 + (1.0 + OVERLAP) * window).parts()?;
         let (lasting, restless) = Cells::lasting(&parts, domain, margin(&domain, reach));
+        let (lasting, restless) = (Arc::new(lasting), restless.into());
         let current = Mutex::new(None);
         Some(Self { solid: solid.clone(), lasting, restless, reach, run, window, current })
     }
@@ -69,7 +71,7 @@ impl MovingMap {
     }
 
     /// The cells of one window: those of the last call, or new ones.
-    fn cells(&self, number: u64, begin: f64, end: f64) -> Option<Arc<Cells>> {
+    fn cells(&self, number: u64, begin: f64, end: f64) -> Option<Arc<Window>> {
         let lock = || self.current.lock().unwrap_or_else(PoisonError::into_inner);
         if let Some((known, cells)) = &*lock()
             && *known == number
@@ -79,12 +81,12 @@ impl MovingMap {
         // not while the lock is held: this thread may take up other work of the pool
         let parts = self.solid.between(begin, end).parts()?;
         let margin = margin(&self.lasting.domain, self.reach);
-        let cells = Arc::new(self.lasting.completed(&self.restless, &parts, margin));
+        let cells = Arc::new(Window::new(self.lasting.clone(), self.restless.clone(), parts, margin));
         *lock() = Some((number, cells.clone()));
         Some(cells)
     }
 
-    /// How many cells are divided anew for each window. The box has 4096 on their level.
+    /// How many cells may be divided anew for each window. The box has 4096 on their level.
     pub fn restless(&self) -> usize {
         self.restless.len()
     }
