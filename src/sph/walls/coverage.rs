@@ -25,6 +25,7 @@ use super::{
     behind::{Behind, Carried},
     friction::{Friction, LEAST_FREE},
     layers::{OfFace, Wall},
+    recess::Recess,
     symmetric::Symmetric,
     volume::Taken,
 };
@@ -143,9 +144,7 @@ impl<F: Friction, B: Behind> Coverage<F, B> {
 
     /// Cosine of the angle between the directions in which two walls lie.
     fn cosine(&self, other: &Self) -> f64 {
-        let (a, b) = (self.gradient, other.gradient);
-        let lengths = (a.length_squared() * b.length_squared()).sqrt();
-        if lengths > 0.0 { (a.dot(b) / lengths).clamp(-1.0, 1.0) } else { 0.0 }
+        cosine_between(self.gradient, other.gradient)
     }
 
     /// The coverage with another friction.
@@ -209,25 +208,27 @@ impl<B: Behind> Coverage<(), B> {
     /// Adds bodies whose volume is known to these walls of the box, which are `continuous` if they are not in layers.
     ///
     /// The bodies take the part b of what the box leaves. What else a wall has follows from its distance. That of the
-    /// bodies is the distance of a plane which takes as much; its gradient along the way is that of b.
+    /// bodies is the distance of a plane which takes as much, or of the planes of an edge or a corner, see [`Recess`]; its
+    /// gradient along the way is that of b. What faces the box takes nothing that the box might have: there b is all that the
+    /// bodies take, by the weight of [`Coverage::and`], for walls in layers. (A particle in the middle of a gap half a spacing
+    /// high, between floor and body, was driven against the body.)
     pub fn with_bodies(&self, wall: &Wall, continuous: &Coverage, taken: &Taken) -> Self {
-        let left = 1.0 - continuous.part;
+        let shared = if wall.layer.is_some() {
+            1.0 - facing(cosine_between(continuous.gradient, taken.gradient))
+        } else {
+            1.0
+        };
+        let left = 1.0 - shared * continuous.part;
         let part = (taken.part / left).min(1.0);
         if part < LEAST_TAKEN {
             return *self;
         }
-        let gradient = (taken.gradient + part * continuous.gradient) / left;
+        let gradient = (taken.gradient + shared * part * continuous.gradient) / left;
         let sweep = taken.sweep / left;
-        let delta = wall.distance_of(part);
-        let plane = wall.of_face(delta, 0.0);
-        // how much faster than λ of a continuous wall the others grow
-        let slope = wall.kernel.slope(delta);
-        // deep in a wall nothing grows any more
-        let in_layers = wall.layer.is_some() && slope > 0.0;
-        let of_part = if in_layers { plane.area / slope } else { 1.0 };
-        let of_barrier = if in_layers { plane.barrier_area / slope } else { 0.0 };
-        // K of layers differs from that of a continuous wall along the normal; for a plane this is exact
-        let of_layers = plane.spread - of_part * delta * slope;
+        // ∮ W·y·n over the surface of the bodies
+        let support = (taken.moment.trace() - 3.0 * taken.part) / left;
+        let Recess { part: of_layered, filled, barrier, of_part, of_barrier, of_layers } =
+            wall.recess(part, support);
         let normal = gradient.normalize_or_zero();
         // of bodies that change their shape the motion of the surface is known
         let velocity = || {
@@ -235,25 +236,22 @@ impl<B: Behind> Coverage<(), B> {
             let of_surface = if steep > 0.0 { sweep / steep * normal } else { DVec3::ZERO };
             taken.velocity.unwrap_or(of_surface)
         };
-        let part = if wall.layer.is_some() { plane.part } else { part };
+        let part = if wall.layer.is_some() { of_layered } else { part };
         let spread = of_part * (taken.moment - taken.part * Symmetric::IDENTITY)
             + of_layers * Symmetric::square(normal);
         let bodies = Self {
             part,
-            filled: plane.filled,
+            filled,
             gradient: of_part * gradient,
             spread,
             sweep: of_part * sweep,
-            barrier: Barrier {
-                part: plane.barrier,
-                gradient: of_barrier * gradient,
-                sweep: of_barrier * sweep,
-            },
+            barrier: Barrier { part: barrier, gradient: of_barrier * gradient, sweep: of_barrier * sweep },
             friction: (),
             behind: B::of_bodies(part, normal, &spread, velocity),
         };
-        let (da, db) = (1.0 - bodies.part, 1.0 - self.part);
-        let whole = self.joined(&bodies, |_, _| (self.part + db * bodies.part, da, db));
+        let (da, db) = (1.0 - shared * bodies.part, 1.0 - shared * self.part);
+        // there is no more than the whole kernel; that the weight of facing walls changes with the place is left out of gradients
+        let whole = self.joined(&bodies, |_, _| ((self.part + db * bodies.part).min(1.0), da, db));
         // K of bodies in the box adds to that of the box
         let behind = whole.behind.with_moments_of(&self.behind, &bodies.behind);
         Self { spread: self.spread + bodies.spread, behind, ..whole }
@@ -281,6 +279,17 @@ impl Barrier {
             sweep: da * self.sweep + db * other.sweep,
         }
     }
+}
+
+/// Cosine of the angle between two directions; 0 if one of them is none.
+fn cosine_between(a: DVec3, b: DVec3) -> f64 {
+    let lengths = (a.length_squared() * b.length_squared()).sqrt();
+    if lengths > 0.0 { (a.dot(b) / lengths).clamp(-1.0, 1.0) } else { 0.0 }
+}
+
+/// How far two walls with this cosine between their directions face each other, 0 to 1.
+fn facing(cosine: f64) -> f64 {
+    std::f64::consts::FRAC_2_PI * arcsine((-cosine).max(0.0))
 }
 
 /// The part of a kernel behind two faces that cover a and b of it, with its derivatives by a and b.

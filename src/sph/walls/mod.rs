@@ -18,6 +18,7 @@ mod friction;
 mod kernel;
 mod layers;
 mod motion;
+mod recess;
 mod shares;
 mod symmetric;
 mod volume;
