@@ -207,7 +207,8 @@ inequality such as `x² + y² <= 1 and 0 <= z <= 1`, or a standard solid such as
 `and`, `or` or `\\` that is a number: `x <= 1 or 2` is all of space.";
 SHAPES_AS_NUMBERS = "W0411":
 "`+`, `-`, `*` and `/` work on the values of ω, and the result is rarely a shape that someone means. Shapes are joined by
-`a or b`, cut by `a and b`, and taken away by `a \\ b`. Where the values are meant, give one of them a name with `let`.";
+`a or b`, cut by `a and b`, and taken away by `a \\ b`, and many of them are joined by `any`, not by `sum`. Comparisons are shapes
+too. Where the values are meant, give one of them a name with `let`.";
 DIVISION_BY_ZERO = "W0412":
 "A divisor is zero wherever it is evaluated, so the value is infinite or no number at all.";
 NO_SECTION = "W0413":
@@ -273,8 +274,8 @@ FLUID_OUTSIDE_BOX = "W0504":
 less of it than the shape says. Make the box larger, move the shape, or cut the shape where the box ends.";
 FLUID_LIGHTER = "W0507":
 "A fluid that fills its vessel has no surface to which it could give way. Methods that keep it from being compressed (dfsph)
-pack its particles at the start, and make them lighter as far as those at curved walls would be too dense otherwise. Forces
-and momentum are smaller by as much. More particles leave smaller gaps; `method: wcsph` keeps all of the mass.";
+pack its particles at the start, and make them lighter: by 5 % at least, because particles that have left their lattice need
+more room, and by more where those at curved walls would be too dense otherwise. Forces and momentum are smaller by as much. More particles leave smaller gaps; `method: wcsph` keeps all of the mass.";
 THIN_FOR_PARTICLES = "W0508":
 "A gap of an obstacle is thinner than the spacing of the particles, or a wall thinner than half of it. No particle finds room in
 such a gap. Through such a wall the fluid on one side feels that on the other more than its own second neighbours. Of a wall whose
@@ -305,7 +306,8 @@ they never become so fast; without `dt` a stable step is derived.";
 ENERGY_GREW = "W0511":
 "The run's energy rose by more than 1 % above what it had at the start and gravity's work since then; where walls move, above
 what was left of that and their work, by more than 1 % of the greatest energy so far; or, where no wall moves, by more than 0.2 % of
-it and a quarter of the greatest energy of motion, as a low wave that grows does. No fluid does that: the method made energy
+it and a quarter of the greatest energy of motion, as a low wave that grows does (of a fluid at rest, which hardly moves, that is not
+told). No fluid does that: the method made energy
 of its errors. What moves faster or higher than it could is wrong from then on. More particles, more `artificial_viscosity`
 (wcsph), or the other method may help; `energy_excess` in the summary has the largest value, and the probe `audit` shows when it
 arose. A run whose energy doubles stops, unless walls move.";
@@ -317,11 +319,12 @@ COMPRESSED = "W0513":
 Look at `compression_p99` in the summary as well: large values mean that particles crowd in a few places, most often at
 walls that the flow hits.";
 DRAG = "W0514":
-"A probe takes the mean of the force on a body that moves, and the method takes pressures in pairs. Rows of particles under pressure
-resist being sheared, as a solid does a little, and what damps their noise acts as a viscosity: a ball of six spacings across
-that moves through water felt six times the drag that it should, and a fifth more than its buoyancy. Forces on bodies at rest in
-a fluid at rest are right, and so are impacts, and the drag of a fluid whose own viscosity is greater than that which damps
-noise. With `method: wcsph` and `gradients: differences` the drag of that ball was right.";
+"A probe takes the mean of the force on a body that moves meanwhile, and the method takes pressures in pairs. Rows of particles
+under pressure resist being sheared, as a solid does a little, and what damps their noise acts as a viscosity: a ball of six
+spacings across that moves through water felt six times the drag that it should, and a fifth more than its buoyancy. Forces on
+bodies at rest in a fluid at rest are right, also on those that have come to rest before the mean begins (`from`), and so are
+impacts, the force on a vessel that moves with its fluid, and the drag of a fluid whose own viscosity is greater than that which
+damps noise. With `method: wcsph` and `gradients: differences` the drag of that ball was right.";
 MANY_STEPS = "W0515":
 "The run takes so many steps that it hardly ends: with a thousand particles a hundred million of them take half a day. Most
 often a number is in another unit than was meant. A `dt` may be left out; steps are as long as speeds of sound and of the fluid,
@@ -343,7 +346,8 @@ wall there.";
 SLOW_SOUND = "W0520":
 "`sound_speed` is stated, and the fluid may become faster than a fifth of it. A weakly compressible fluid changes its density
 by about the square of its speed over that of sound: 1 % at a tenth, 5 % at more than a fifth. Beyond, it is a gas, and what is
-found is not that of a liquid. Left out, the speed of sound is ten times the greatest expected speed.";
+found is not that of a liquid. Left out, the speed of sound is ten times the greatest expected speed u, or with surface tension σ
+ten times √(u² + σ/ρa), with the spacing a.";
 OBSTACLE_FILLS_BOX = "E0502":
 "The obstacle covers every place where fluid was to be put: nothing is left to simulate.";
 }

@@ -14,6 +14,7 @@
 
 mod bodies;
 mod deviation;
+mod drag;
 mod dry;
 mod every;
 mod filling;
@@ -106,7 +107,7 @@ impl Experiment {
         let warnings = too_long.into_iter().chain(parameters::stirring(&scene, &parameters));
         let warnings = warnings.chain(parameters::slow_sound(&scene, &parameters));
         let warnings = warnings.chain(parameters::many_steps(&scene, &parameters));
-        let warnings = warnings.chain(parameters::drag(&scene, &parameters, &bodies));
+        let warnings = warnings.chain(drag::warnings(&scene, &parameters, &bodies));
         let warnings = warnings.chain(probes::in_bodies(&scene, &bodies, parameters.spacing())).collect();
         Ok(Self { program, scene, parameters, time_step, bodies, fluid, warnings })
     }

@@ -2,13 +2,12 @@
 
 use glam::DVec3;
 
-use super::bodies::Body;
 use super::{vector_field, velocities};
 use crate::Program;
 use crate::diagnostic::{Code, Diagnostic};
 use crate::ir::Node;
-use crate::lower::{Gravity, Measured, Probe, Scene};
-use crate::sph::{Gradients, Method, Parameters, Slip};
+use crate::lower::{Gravity, Scene};
+use crate::sph::{Method, Parameters, Slip};
 
 /// The length of a simulation's steps, and where it comes from.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -19,13 +18,19 @@ pub struct TimeStep {
     pub reason: &'static str,
 }
 
+/// Number of times of a run at which what depends on time alone is looked at, and what depends on the place too.
+const MANY_INSTANTS: usize = 256;
+const SOME_INSTANTS: usize = 13;
+
 /// A speed that the fluid can reach by its velocity at the start and a fall through the box, m/s.
 pub(super) fn typical_speed(program: &Program, scene: &Scene) -> f64 {
     let size = scene.domain.size();
+    let along = |gravity: DVec3| gravity.length() * gravity.normalize_or_zero().abs().dot(size);
     let fall = match &scene.gravity {
-        Gravity::Still(_) | Gravity::Turning(_) => {
-            let gravity = at_start(program, &scene.gravity);
-            gravity.length() * gravity.normalize_or_zero().abs().dot(size)
+        Gravity::Still(gravity) => along(*gravity),
+        Gravity::Turning(nodes) => {
+            let gravity = vector_field(program, nodes);
+            instants(scene, MANY_INSTANTS).map(|time| along(gravity(DVec3::ZERO, time))).fold(0.0, f64::max)
         }
         Gravity::Field(nodes) => most_in_fluid(program, scene, nodes, |gravity| gravity.abs().dot(size)),
     };
@@ -119,7 +124,7 @@ pub(super) fn stirring(scene: &Scene, parameters: &Parameters) -> Option<Diagnos
 /// of the speed over that of sound.
 pub(super) fn slow_sound(scene: &Scene, parameters: &Parameters) -> Option<Diagnostic> {
     let Method::Wcsph(numbers) = scene.method else { return None };
-    let (sound, speed) = (numbers.sound_speed?, parameters.expected_speed);
+    let (sound, speed) = (numbers.sound_speed?, numbers.driven_speed(&parameters.scales()));
     let rounded = |value: f64| format!("{value:.1e}").parse().unwrap_or(value);
     let change = 100.0 * (speed / sound).powi(2);
     (change > MUCH_COMPRESSED).then(|| {
@@ -131,33 +136,6 @@ pub(super) fn slow_sound(scene: &Scene, parameters: &Parameters) -> Option<Diagn
         Diagnostic::warning(Code::SLOW_SOUND, scene.fluid.shape_span, message)
             .help(format!("leave `sound_speed` out, or write {} m/s or more", rounded(10.0 * speed)))
     })
-}
-
-/// A warning for each mean of the force on a body that moves, with a method that makes its drag too large.
-pub(super) fn drag(scene: &Scene, parameters: &Parameters, bodies: &[Body]) -> Vec<Diagnostic> {
-    if parameters.viscosity >= parameters.rest_density * parameters.numerical_viscosity() {
-        return Vec::new();
-    }
-    let in_pairs = match scene.method {
-        Method::Wcsph(numbers) => numbers.gradients == Gradients::Pairs,
-        Method::Dfsph(_) => true,
-        // its fluid is as thick as the paper's, and gives more drag than that anyway
-        Method::Paper(_) => false,
-    };
-    let told = |probe: &Probe| match probe.measured {
-        Measured::Force { body, .. }
-            if probe.mean.is_some()
-                && bodies.get(body).is_some_and(|body| body.obstacle.moving.is_some()) =>
-        {
-            let message = "with pressures in pairs the drag of a body that moves through the fluid is several times too large";
-            Some(
-                Diagnostic::warning(Code::DRAG, probe.span, message)
-                    .help("write `gradients: differences` with `method: wcsph`"),
-            )
-        }
-        _ => None,
-    };
-    if in_pairs { scene.probes.iter().filter_map(told).collect() } else { Vec::new() }
 }
 
 /// The length of steps, and a warning if the scene states a longer one than is stable.
@@ -229,6 +207,13 @@ fn at_start(program: &Program, gravity: &Gravity) -> DVec3 {
     }
 }
 
+/// Times of a run, s, at which what depends on time is looked at: its start, its end, and between them such that no period of
+/// an oscillation divides.
+fn instants(scene: &Scene, number: usize) -> impl Iterator<Item = f64> + use<'_> {
+    let between = (0..number).map(move |k| (k as f64 + 0.618) / number as f64);
+    between.chain([0.0, 1.0]).map(|part| part * scene.run.until)
+}
+
 /// The greatest speed at the start, m/s, of the points of a grid over the box.
 fn fastest(program: &Program, scene: &Scene) -> f64 {
     let velocities = velocities(program, &scene.fluid);
@@ -245,13 +230,13 @@ fn most(scene: &Scene, value: impl Fn(DVec3) -> f64) -> f64 {
     (0..SIDE.pow(3)).map(|k| value(at(k))).filter(|v| v.is_finite()).fold(0.0, f64::max)
 }
 
-/// The greatest size of a vector where the fluid is at the start, at four instants of the run; at least 0. Formulas may have
+/// The greatest size of a vector where the fluid is at the start, at some instants of the run; at least 0. Formulas may have
 /// poles elsewhere.
 fn most_in_fluid(program: &Program, scene: &Scene, nodes: &[Node; 3], size: impl Fn(DVec3) -> f64) -> f64 {
     let (fluid, vector) = (vector_field(program, &[scene.fluid.shape; 3]), vector_field(program, nodes));
     let inside = |p: DVec3, time: f64| if fluid(p, 0.0).x > 0.0 { size(vector(p, time)) } else { 0.0 };
     let at = |time: f64| most(scene, |p| inside(p, time));
-    [0.0, 0.25, 0.5, 1.0].map(|part| at(part * scene.run.until)).into_iter().fold(0.0, f64::max)
+    instants(scene, SOME_INSTANTS).map(at).fold(0.0, f64::max)
 }
 
 /// A speed that the fluid reaches where it neither falls nor moves at the start: that of its known solution, of surfaces that

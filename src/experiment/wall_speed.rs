@@ -61,11 +61,12 @@ pub(super) fn greatest(
     };
     let reach = size.min(domain.size().max_element());
     let mut greatest = 0.0;
-    at_places(solid, domain, until, |[now, later], (p, normal)| {
+    at_places(solid, domain, until, |(time, [now, later]), (p, normal)| {
         let velocity = now.wall_velocity(p);
         let along = match (slip, &belt) {
             (Slip::Free, _) => 0.0,
-            (Slip::No, Some(belt)) => belt(p, now.time()).length(),
+            // of a solid at rest, which knows no time, the surface may move all the same
+            (Slip::No, Some(belt)) => belt(p, time).length(),
             (Slip::No, None) => velocity.length(),
         };
         let across = velocity.dot(normal);
@@ -84,7 +85,7 @@ pub(super) fn greatest(
 /// is too far, the half in which it moves farther is looked at in the same way.
 pub(super) fn time_for(solid: &Solid, way: f64, domain: &Aabb, until: f64) -> Option<f64> {
     let mut time: Option<f64> = None;
-    at_places(solid, domain, until, |[now, later], (p, normal)| {
+    at_places(solid, domain, until, |(_, [now, later]), (p, normal)| {
         let speed = now.wall_velocity(p).dot(normal);
         let change = later.wall_velocity(p).dot(normal) - speed;
         let by_speed = way / speed.abs();
@@ -111,7 +112,8 @@ fn quiet_time(solid: &Solid, way: f64, domain: &Aabb, [mut from, mut to]: [f64; 
     Some(to - from)
 }
 
-/// How far places of the surface at a time, s, are from the surface at another one, m, at most.
+/// How far places of the surface at a time, s, are from the surface at another one, m, at most, the error of these places
+/// included, which is small beside what a wall moves in a run; [`moved`] is without it.
 fn farthest(solid: &Solid, domain: &Aabb, [from, to]: [f64; 2]) -> Option<f64> {
     let (now, then) = (solid.at(from), solid.at(to));
     let ways = (0..SIDE.pow(3)).filter_map(|start| on_surface(&now, domain, start)).map(|(p, _)| {
@@ -121,15 +123,35 @@ fn farthest(solid: &Solid, domain: &Aabb, [from, to]: [f64; 2]) -> Option<f64> {
     ways.filter(|way| way.is_finite()).reduce(f64::max)
 }
 
-/// Calls `see` with a solid at some times of a run and a little later, and with places of its surface in a box and their
-/// normals.
-fn at_places(solid: &Solid, domain: &Aabb, until: f64, mut see: impl FnMut([&Solid; 2], (DVec3, DVec3))) {
+/// How far places of a solid's surface in a box move along their normals from one time, s, to another, m, at most. `None` if no
+/// place of its surface is found.
+pub(super) fn moved(solid: &Solid, domain: &Aabb, [from, to]: [f64; 2]) -> Option<f64> {
+    let (now, then) = (solid.at(from), solid.at(to));
+    let distance = |solid: &Solid, p: DVec3| {
+        let (omega, gradient) = solid.omega_grad(p);
+        omega / gradient.length()
+    };
+    // places are found but for small errors, which are no motion
+    let ways = (0..SIDE.pow(3))
+        .filter_map(|start| on_surface(&now, domain, start))
+        .map(|(p, _)| (distance(&then, p) - distance(&now, p)).abs());
+    ways.filter(|way| way.is_finite()).reduce(f64::max)
+}
+
+/// Calls `see` with some times of a run, s, the solid at that time and a little later, and with places of its surface in a
+/// box and their normals.
+fn at_places(
+    solid: &Solid,
+    domain: &Aabb,
+    until: f64,
+    mut see: impl FnMut((f64, [&Solid; 2]), (DVec3, DVec3)),
+) {
     for k in 0..TIMES {
         // instants that no period of a motion divides, and at which none begins
         let time = until * (k as f64 + 0.618) / TIMES as f64;
         let (now, later) = (solid.at(time), solid.at(time + SOON * until));
         for place in (0..SIDE.pow(3)).filter_map(|start| on_surface(&now, domain, start)) {
-            see([&now, &later], place);
+            see((time, [&now, &later]), place);
         }
     }
 }

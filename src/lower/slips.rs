@@ -134,7 +134,7 @@ impl Lowering<'_> {
         }
     }
 
-    /// Warns of the first operand of `and`, `or` or `\\` that is a number, as in `x <= 1 or 2`.
+    /// Warns of the first operand of `and`, `or` or `\` that is a number, as in `x <= 1 or 2`.
     pub fn warn_of_numbers(&mut self, op: Logic, operands: &[Expr], nodes: &[Node]) {
         let is_number =
             |expr: &Expr| matches!(without_sign(expr).kind, ExprKind::Number(_) | ExprKind::Quantity { .. });

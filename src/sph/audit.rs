@@ -2,8 +2,9 @@
 //! believed. It runs in every simulation and changes nothing in it.
 //!
 //! Energy is compared with the work of gravity and of walls after every step: E = ½Σmv² + Σm·e(ρ) − W. The work of
-//! uniform gravity is M·g·Δ(centre of mass), and that of a field of gravity is the integral of its power. That of walls which
-//! move is the sum of force times way over what they do to particles in pressure, friction and contacts. Viscosity,
+//! uniform gravity is M·g·Δ(centre of mass), and that of a field of gravity is the integral of its power. Where a method's
+//! velocities are those of the middle of a step, only half of what the field does in it is set against them. The work of walls
+//! which move is the sum of force times way over what they do to particles in pressure, friction and contacts. Viscosity,
 //! contacts with walls at rest and diffusion only take from E, so all that it gains is an error of the method. Where walls work
 //! on the fluid, what they give is soon dissipated, and would hide any gain: there E is compared with the least that it has been.
 //! The energy that a surface under tension has at the start may become motion, so it is allowed for.
@@ -43,6 +44,10 @@ const MOST_OF_MOTION: f64 = 0.25;
 /// The least excess, as a part of the reference, that is a finding by this measure: water that comes to rest moves
 /// next to nothing.
 const LEAST_EXCESS: f64 = 0.002;
+
+/// The energy of motion, as a part of the reference, below which waves are not said to have grown. Water at rest has less, and
+/// what it gains as its particles leave their lattice has nothing to do with motion.
+const LEAST_MOTION: f64 = 1e-3;
 
 /// An excess of energy, as a part of the reference, that ends a run.
 const RUINOUS_EXCESS: f64 = 1.0;
@@ -203,13 +208,19 @@ struct Sums {
     squares: f64,
     places: DVec3,
     elastic: f64,
+    /// Power of a field of gravity at the present places, and where particles with their velocities were a step ago, W/kg.
     power: f64,
+    power_before: f64,
+    /// Sum of what the field pulls with, m/s².
+    pull: f64,
     fastest: f64,
 }
 
 impl Sums {
-    fn of(core: &Core) -> Self {
+    /// The sums after a step of the length `dt`, s.
+    fn of(core: &Core, dt: f64) -> Self {
         let (method, scales) = (core.parameters.method.numerics(), core.parameters.scales());
+        let is_staggered = method.is_staggered();
         let position = core.particles.position.components().map(|c| c.par_chunks(CHUNK));
         let velocity = core.particles.velocity.components().map(|c| c.par_chunks(CHUNK));
         let [x, y, z] = position;
@@ -231,8 +242,13 @@ impl Sums {
                 sums.elastic = method.elastic_energies(&scales, density);
                 if let Some(field) = &core.gravity_field {
                     for k in 0..x.len() {
-                        let pull = field(DVec3::new(x[k], y[k], z[k]), core.time);
-                        sums.power += pull.dot(DVec3::new(u[k], v[k], w[k]));
+                        let (place, velocity) = (DVec3::new(x[k], y[k], z[k]), DVec3::new(u[k], v[k], w[k]));
+                        let pull = field(place, core.time);
+                        sums.power += pull.dot(velocity);
+                        sums.pull += pull.length();
+                        if is_staggered {
+                            sums.power_before += field(place - dt * velocity, core.time - dt).dot(velocity);
+                        }
                     }
                 }
                 sums
@@ -243,6 +259,8 @@ impl Sums {
             places: a.places + b.places,
             elastic: a.elastic + b.elastic,
             power: a.power + b.power,
+            power_before: a.power_before + b.power_before,
+            pull: a.pull + b.pull,
             fastest: a.fastest.max(b.fastest),
         };
         let sum = sums.into_iter().fold(Self::default(), add);
@@ -253,18 +271,11 @@ impl Sums {
 impl Audit {
     /// The audit of a simulation at its start. `densities` are those that the particles' places say, kg/m³.
     pub(super) fn start(core: &Core, densities: &[f64]) -> Self {
-        let sums = Sums::of(core);
+        let sums = Sums::of(core, 0.0);
         let Core { parameters, boundary, particles, .. } = core;
-        let mass = parameters.particle_mass;
-        let (g, n) = (parameters.gravity, particles.len() as f64);
-        let floor = boundary.domain.corners().map(|c| -g.dot(c)).into_iter().fold(f64::INFINITY, f64::min);
+        let (mass, n) = (parameters.particle_mass, particles.len() as f64);
         let at_start = mass * (0.5 * sums.squares + sums.elastic) + surface_energy(parameters, densities);
-        // a field of gravity has no lowest corner; a fall by the support radius is its scale
-        let of_field = core.gravity_field.as_ref().map_or(0.0, |field| {
-            particles.position.iter().map(|x| field(x, core.time).length()).sum::<f64>()
-                * parameters.support_radius
-        });
-        let height = mass * (-g.dot(sums.places) - n * floor + of_field);
+        let height = height(core, &sums);
         let scale = n * mass * parameters.expected_speed.powi(2);
         let is_moved = boundary.any_moves();
         let reference = if is_moved { LEAST_GIVEN * scale } else { 0.0f64 }.max(at_start + height);
@@ -311,12 +322,16 @@ impl Audit {
         dt: f64,
         by_walls: f64,
     ) -> Result<(), StepError> {
-        let sums = Sums::of(core);
+        let sums = Sums::of(core, dt);
         let parameters = &core.parameters;
         let mass = parameters.particle_mass;
+        let is_staggered = parameters.method.numerics().is_staggered();
         let power = mass * sums.power;
-        let by_gravity =
-            mass * parameters.gravity.dot(sums.places - self.places) + 0.5 * dt * (self.power + power);
+        let before = if is_staggered { mass * sums.power_before } else { self.power };
+        let by_fall = mass * parameters.gravity.dot(sums.places - self.places);
+        let by_gravity = by_fall + 0.5 * dt * (before + power);
+        // the part of it that the velocities do not show yet
+        let to_come = if is_staggered { 0.5 * dt * power } else { 0.0 };
         if by_walls.is_finite() {
             self.work += by_gravity + by_walls;
             self.by_walls += by_walls;
@@ -328,7 +343,7 @@ impl Audit {
         (self.now.speed, self.max_speed) = (sums.fastest, self.max_speed.max(sums.fastest));
         if self.unjudged.is_none() {
             let energy = mass * (0.5 * sums.squares + sums.elastic);
-            let gained = energy - self.at_start - self.work;
+            let gained = energy - self.at_start - (self.work - to_come);
             if self.is_moved {
                 let height = self.height - (self.work - self.by_walls);
                 self.reference = self.reference.max(energy + height);
@@ -337,8 +352,11 @@ impl Audit {
                     self.look_at_gain(parameters.surface_tension);
                 }
             } else {
-                // gravity that turns may bring in more than there was
+                // gravity that turns may bring in more than there was, and one that grows makes a depth worth more
                 self.reference = self.reference.max(self.at_start + self.work);
+                if core.turning_gravity.is_some() || core.gravity_field.is_some() {
+                    self.reference = self.reference.max(height(core, &sums));
+                }
                 let excess = gained / self.reference;
                 (self.now.excess, self.excess) = (excess, self.excess.max(excess));
                 if excess > RUINOUS_EXCESS {
@@ -421,7 +439,8 @@ impl Audit {
         let energy = self.energy_excess().and_then(|excess| {
             let gained = excess * self.reference;
             let is_more = gained > MOST_OF_MOTION * self.liveliest;
-            let outgrows_motion = !self.is_moved && excess > LEAST_EXCESS && is_more;
+            let has_moved = self.liveliest > LEAST_MOTION * self.reference;
+            let outgrows_motion = !self.is_moved && has_moved && excess > LEAST_EXCESS && is_more;
             let of_all = percent(excess);
             match (excess > MOST_EXCESS, self.is_moved) {
                 (true, true) => Some(format!(
@@ -574,6 +593,16 @@ impl Audit {
             told: told.map(|told| told != 0.0),
         };
     }
+}
+
+/// The energy of a fluid's height, J: that of its fall to the lowest corner of the box. A field of gravity has no lowest corner;
+/// a fall by the support radius is its scale.
+fn height(core: &Core, sums: &Sums) -> f64 {
+    let Core { parameters, boundary, particles, .. } = core;
+    let g = parameters.gravity;
+    let floor = boundary.domain.corners().map(|c| -g.dot(c)).into_iter().fold(f64::INFINITY, f64::min);
+    let of_field = parameters.support_radius * sums.pull;
+    parameters.particle_mass * (-g.dot(sums.places) - particles.len() as f64 * floor + of_field)
 }
 
 /// Energy of the surface under tension, J: the tension times an area. Each particle below a flat surface lacks

@@ -223,13 +223,13 @@ impl Core {
         self.gravity_field.is_some() || self.parameters.gravity != DVec3::ZERO
     }
 
-    /// Adds to the accelerations the gravity that depends on the place, if there is any.
-    pub fn pull(&mut self) {
+    /// Adds to the accelerations a part of the gravity that depends on the place, if there is any.
+    pub fn pull(&mut self, part: f64) {
         let Some(field) = &self.gravity_field else { return };
         let (position, time) = (&self.particles.position, self.boundary.time);
         let [x, y, z] = self.acceleration.components_mut();
         x.par_iter_mut().zip(y).zip(z).enumerate().for_each(|(i, ((x, y), z))| {
-            let pull = field(position.get(i), time);
+            let pull = part * field(position.get(i), time);
             *x += pull.x;
             *y += pull.y;
             *z += pull.z;

@@ -125,7 +125,7 @@ impl Parameters {
     }
 
     /// What the method derives numbers from.
-    pub(super) fn scales(&self) -> Scales {
+    pub(crate) fn scales(&self) -> Scales {
         Scales {
             rest_density: self.rest_density,
             particle_mass: self.particle_mass,
@@ -156,12 +156,18 @@ impl Parameters {
 
     /// Whether the method keeps the fluid from being compressed, at any cost.
     pub fn keeps_density(&self) -> bool {
-        self.method.numerics().kept_compression().is_some()
+        self.method.numerics().keeps_density()
     }
 
     /// Whether particles that start too near to an obstacle are moved away from it instead of being dropped.
     pub fn makes_room_at_start(&self) -> bool {
         self.method.numerics().makes_room_at_start()
+    }
+
+    /// The mean compression, as a part of the rest density, within which the method is to keep the fluid; `None` if it promises
+    /// none.
+    pub(super) fn kept_compression(&self) -> Option<f64> {
+        self.method.numerics().kept_compression()
     }
 
     /// Speed of sound, m/s; 0 if the method has no compression.
@@ -236,7 +242,14 @@ mod tests {
         check(|p| p.support_radius = 1e-60, "support_radius");
         check(|p| p.method = Paper { stiffness: f64::INFINITY, ..Paper::default() }.into(), "stiffness");
         check(|p| p.method = Wcsph { sound_speed: Some(0.0), ..Wcsph::default() }.into(), "sound_speed");
-        check(|p| (p.method, p.expected_speed) = (Wcsph::default().into(), 0.0), "sound_speed");
+        fn slow(p: &mut Parameters, tension: f64) {
+            (p.method, p.expected_speed, p.surface_tension) = (Wcsph::default().into(), 0.0, tension);
+        }
+        check(|p| slow(p, 0.0), "sound_speed");
+        // ripples have a speed where nothing else moves
+        let mut drop = Parameters::default();
+        slow(&mut drop, 1.0);
+        assert_eq!(drop.validate(), Ok(()));
         check(|p| p.method = Dfsph { tolerance: 2.0, ..Dfsph::default() }.into(), "compression");
         check(|p| p.method = Dfsph { most_iterations: 0, ..Dfsph::default() }.into(), "iterations");
         check(|p| p.viscosity = -1.0, "viscosity");

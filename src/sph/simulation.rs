@@ -178,12 +178,12 @@ impl Simulation {
 
     /// What a user must know about the simulation so far, each finding with a sentence.
     pub fn findings(&self) -> Vec<(Finding, String)> {
-        self.audit.findings(self.core.parameters.method.numerics().kept_compression())
+        self.audit.findings(self.core.parameters.kept_compression())
     }
 
     /// The findings that this function has not returned before.
     pub fn news(&mut self) -> Vec<(Finding, String)> {
-        self.audit.news(self.core.parameters.method.numerics().kept_compression())
+        self.audit.news(self.core.parameters.kept_compression())
     }
 
     /// The parameters. Gravity is that of the present step.
@@ -248,7 +248,7 @@ impl Simulation {
     pub fn set_gravity_field(&mut self, field: Arc<VectorField>) {
         self.core.gravity_field = Some(field);
         if self.core.steps == 0 {
-            self.core.pull();
+            self.core.pull(1.0);
         }
         self.begin_audit();
     }

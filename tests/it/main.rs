@@ -59,6 +59,7 @@ mod tolerance;
 mod tool;
 mod triangle_solids;
 mod validation;
+mod vessels;
 mod view;
 mod wall_work;
 mod walls;

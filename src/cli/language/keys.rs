@@ -50,7 +50,12 @@ const BOX: Rows = &[
         "0.5",
         "the part of its normal speed with which a particle that hits a wall bounces off, 0 … 1",
     ),
-    ("friction", "", "0", "the coefficient of friction of particles that hit a wall"),
+    (
+        "friction",
+        "",
+        "0",
+        "the coefficient of friction of particles that hit a wall; a fluid that rests on a wall is held off it by pressure, and feels no friction",
+    ),
 ];
 
 const OBSTACLE: Rows = &[
@@ -61,7 +66,12 @@ const OBSTACLE: Rows = &[
         "0.5",
         "the part of its normal speed with which a particle that hits it bounces off, 0 … 1",
     ),
-    ("friction", "", "0", "the coefficient of friction of particles that hit it"),
+    (
+        "friction",
+        "",
+        "0",
+        "the coefficient of friction of particles that hit it; a fluid that rests on it is held off by pressure, and feels no friction",
+    ),
     ("walls", "", "that of the scene", "whether the fluid slips along it or sticks to it"),
     (
         "surface_velocity",

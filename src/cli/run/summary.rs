@@ -173,7 +173,14 @@ pub(super) fn print(summary: &Summary, frames: &Frames, probes: &Probes) {
                     readable(work)
                 )
             }
-            (Some(excess), ..) => format!("never more than {excess:.2e} of it above what gravity gave"),
+            (Some(excess), ..) => {
+                let surface = if summary.passes.contains(&"surface tension") {
+                    " and what the surface had at the start"
+                } else {
+                    ""
+                };
+                format!("never more than {excess:.2e} of it above what gravity gave{surface}")
+            }
             (None, _, Some(why)) => format!("not judged: {why}"),
             (None, _, None) => "not judged".to_string(),
         }
@@ -187,8 +194,15 @@ pub(super) fn print(summary: &Summary, frames: &Frames, probes: &Probes) {
     );
     let errors = [summary.pressure_error, summary.velocity_error, summary.front_error];
     for (what, error) in Deviation::NAMES.into_iter().zip(errors) {
-        if let Some(error) = error {
-            say!("{what}: {:.2} % from what is known (relative L2 over the saved instants)", 100.0 * error);
+        match error {
+            Some(error) if error.is_finite() => {
+                say!(
+                    "{what}: {:.2} % from what is known (relative L2 over the saved instants)",
+                    100.0 * error
+                );
+            }
+            Some(_) => say!("{what}: what is known is zero all over, so no deviation is a part of it"),
+            None => {}
         }
     }
     for means in &summary.probes {

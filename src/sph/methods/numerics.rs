@@ -107,6 +107,16 @@ pub(in crate::sph) trait Numerics: Sync {
         None
     }
 
+    /// Whether it keeps the fluid from being compressed, at any cost.
+    fn keeps_density(&self) -> bool {
+        false
+    }
+
+    /// Whether, under a force that depends on the place, the velocities after a step are those of its middle.
+    fn is_staggered(&self) -> bool {
+        false
+    }
+
     /// Whether each step notes what walls do to particles, see `Reaction`. Without that, forces on obstacles are those of
     /// contacts, and of the pressure in front of their surfaces.
     fn notes_reactions(&self) -> bool {

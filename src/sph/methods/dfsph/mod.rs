@@ -148,6 +148,7 @@ impl Declaration for Dfsph {
         "debt",
         "own pressure",
         "stiffness",
+        "last step",
         "crowding x",
         "crowding y",
         "crowding z",
@@ -198,6 +199,15 @@ impl Numerics for Dfsph {
 
     fn kept_compression(&self) -> Option<f64> {
         Some(self.tolerance)
+    }
+
+    fn keeps_density(&self) -> bool {
+        true
+    }
+
+    /// Velocities change by the forces at the present places, and then carry the particles on.
+    fn is_staggered(&self) -> bool {
+        true
     }
 
     fn notes_reactions(&self) -> bool {

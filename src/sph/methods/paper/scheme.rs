@@ -89,7 +89,7 @@ impl PaperScheme {
             acceleration.y.fill(g.y);
             acceleration.z.fill(g.z);
             core.acceleration = acceleration;
-            core.pull();
+            core.pull(1.0);
             return;
         }
         let mut predicted = std::mem::take(&mut core.spare);
@@ -120,7 +120,7 @@ impl PaperScheme {
         }
         core.acceleration = acceleration;
         core.spare = predicted;
-        core.pull();
+        core.pull(1.0);
     }
 }
 

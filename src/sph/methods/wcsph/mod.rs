@@ -44,8 +44,8 @@ pub enum Gradients {
 /// Numbers of the weakly compressible method.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Wcsph {
-    /// Speed of sound c, m/s. `None`: ten times the greatest expected speed, which keeps changes of the
-    /// density within 1 %.
+    /// Speed of sound c, m/s. `None`: ten times √(u² + σ/ρa), with the greatest expected speed u and surface tension σ over a
+    /// spacing a, which keeps changes of the density within 1 %.
     pub sound_speed: Option<f64>,
     /// δ of the density diffusion (Molteni & Colagrossi 2009). `None`: 0.1, and 0 where surface tension moves the fluid;
     /// zero: the term is not computed.
@@ -85,9 +85,14 @@ impl Wcsph {
     /// therefore grows with the depth. Diffusion levels that, out of step with the motion: a drop that oscillates, or one at
     /// rest, gains energy. So there is none where waves of the particles' size are not much slower than the fluid.
     fn density_diffusion(&self, scales: &Scales) -> f64 {
-        let capillary = (scales.surface_tension / (scales.rest_density * scales.spacing())).sqrt();
-        let moves = capillary > CAPILLARY * scales.expected_speed;
+        let moves = ripples(scales) > CAPILLARY * scales.expected_speed;
         self.density_diffusion.unwrap_or(if moves { 0.0 } else { 0.1 })
+    }
+
+    /// The speed √(u² + σ/ρa), m/s, whose square times the rest density is the greatest pressure that is expected: of the expected
+    /// speed u, and of ripples. Surface tension presses with 2σ/r on a drop of the radius r, which is at least two spacings a.
+    pub(crate) fn driven_speed(&self, scales: &Scales) -> f64 {
+        scales.expected_speed.hypot(ripples(scales))
     }
 
     /// α of the artificial viscosity, stated or derived.
@@ -136,7 +141,7 @@ impl Declaration for Wcsph {
                 bound: Bound::Positive,
                 get: |wcsph| wcsph.sound_speed,
                 set: |wcsph, speed| wcsph.sound_speed = Some(speed),
-                derived: "ten times the greatest expected speed",
+                derived: "ten times the greatest expected speed u; with surface tension ten times √(u² + σ/ρa), with the spacing a",
             },
         },
         Key {
@@ -241,6 +246,11 @@ impl Declaration for Wcsph {
     }
 }
 
+/// The speed √(σ/ρa) of surface tension over a spacing a, m/s.
+fn ripples(scales: &Scales) -> f64 {
+    (scales.surface_tension / (scales.rest_density * scales.spacing())).sqrt()
+}
+
 impl Numerics for Wcsph {
     fn numerical_viscosity(&self, scales: &Scales) -> f64 {
         let alpha = self.artificial_viscosity().max(PAIRS_ALPHA);
@@ -256,7 +266,12 @@ impl Numerics for Wcsph {
     }
 
     fn sound_speed(&self, scales: &Scales) -> f64 {
-        self.sound_speed.unwrap_or(SOUND_OVER_SPEED * scales.expected_speed)
+        self.sound_speed.unwrap_or(SOUND_OVER_SPEED * self.driven_speed(scales))
+    }
+
+    /// What a fluid is compressed by at its greatest speed, whatever speed of sound a scene states.
+    fn kept_compression(&self) -> Option<f64> {
+        Some(SOUND_OVER_SPEED.powi(-2))
     }
 
     /// The density ρ₀(1 + 7p/(c²ρ₀))^(1/7), the inverse of Tait's equation.

@@ -286,7 +286,7 @@ impl Weakly {
         }
         self.found = [std::mem::replace(&mut self.places, places), std::mem::replace(&mut self.drift, drift)];
         self.last_dt = dt;
-        core.pull();
+        core.pull(1.0);
         self.tension.act(core);
     }
 
