@@ -25,6 +25,9 @@ const CAPILLARY: f64 = 0.05;
 /// α of the artificial viscosity with pairs of pressures, unless it is stated.
 const PAIRS_ALPHA: f64 = 0.1;
 
+/// The part of the artificial viscosity from which on a fluid's own takes its place. Water has far less.
+const THIN: f64 = 0.01;
+
 /// The speed of sound over the greatest expected speed, unless it is stated. This keeps changes of the
 /// density within 1 %.
 const SOUND_OVER_SPEED: f64 = 10.0;
@@ -51,8 +54,8 @@ pub struct Wcsph {
     /// zero: the term is not computed.
     pub density_diffusion: Option<f64>,
     /// α of the artificial viscosity (Monaghan 1992). With pairs of pressures it acts on rough motion alone; with
-    /// differences on all, which without it would gain energy. `None`: 0.1 with pairs, 0.02 with differences; zero: the term
-    /// is not computed.
+    /// differences on all, which without it would gain energy. `None`: 0.1 with pairs, 0.02 with differences, less what the
+    /// fluid's own viscosity damps; zero: the term is not computed.
     pub artificial_viscosity: Option<f64>,
     /// How the pressures of two particles enter their acceleration.
     pub gradients: Gradients,
@@ -95,11 +98,17 @@ impl Wcsph {
         scales.expected_speed.hypot(ripples(scales))
     }
 
-    /// α of the artificial viscosity, stated or derived.
-    fn artificial_viscosity(&self) -> f64 {
-        self.artificial_viscosity.unwrap_or(match self.gradients {
-            Gradients::Pairs => PAIRS_ALPHA,
-            Gradients::Differences => 0.02,
+    /// α of the artificial viscosity, stated or derived: what a fluid's own viscosity damps need not be damped again. (In a ring
+    /// ten spacings wide, with half as much artificial viscosity as its own, a flow was 24 % too slow, and is 14 % without it.)
+    fn artificial_viscosity(&self, scales: &Scales) -> f64 {
+        self.artificial_viscosity.unwrap_or_else(|| {
+            let alpha = match self.gradients {
+                Gradients::Pairs => PAIRS_ALPHA,
+                Gradients::Differences => 0.02,
+            };
+            let artificial = roughness::viscosity(alpha, self.sound_speed(scales), scales.support_radius);
+            let own = scales.viscosity / (scales.rest_density * artificial);
+            if own < THIN { alpha } else { alpha * (1.0 - own).max(0.0) }
         })
     }
 
@@ -165,7 +174,7 @@ impl Declaration for Wcsph {
                 bound: Bound::NotNegative,
                 get: |wcsph| wcsph.artificial_viscosity,
                 set: |wcsph, alpha| wcsph.artificial_viscosity = Some(alpha),
-                derived: "0.1 with pairs, 0.02 with differences",
+                derived: "0.1 with pairs, 0.02 with differences, less what the fluid's own viscosity damps",
             },
         },
         Key {
@@ -217,8 +226,8 @@ impl Declaration for Wcsph {
         (Pass::Pressure, |_, _| None),
         (Pass::PressureSolver, |_, _| Some(Pass::STATE)),
         (Pass::Viscosity, |_, scales| Pass::without_viscosity(scales)),
-        (Pass::ArtificialViscosity, |wcsph, _| {
-            (wcsph.artificial_viscosity() == 0.0).then_some("the artificial viscosity is zero")
+        (Pass::ArtificialViscosity, |wcsph, scales| {
+            (wcsph.artificial_viscosity(scales) == 0.0).then_some("the artificial viscosity is zero")
         }),
         (Pass::Shifting, |wcsph, _| (wcsph.shifting() == 0.0).then_some("the shifting is zero")),
         (Pass::NoSlip, |_, scales| Pass::without_friction(scales)),
@@ -253,7 +262,7 @@ fn ripples(scales: &Scales) -> f64 {
 
 impl Numerics for Wcsph {
     fn numerical_viscosity(&self, scales: &Scales) -> f64 {
-        let alpha = self.artificial_viscosity().max(PAIRS_ALPHA);
+        let alpha = self.artificial_viscosity.unwrap_or(PAIRS_ALPHA).max(PAIRS_ALPHA);
         roughness::viscosity(alpha, self.sound_speed(scales), scales.support_radius)
     }
 
@@ -297,5 +306,36 @@ impl Numerics for Wcsph {
     /// Differences of pressure do not cancel, so that a particle's neighbours take part in what remains.
     fn notes_reactions(&self) -> bool {
         self.gradients == Gradients::Pairs
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Water is damped as the method says; of a thick fluid only what its own viscosity leaves, and of a thicker one nothing.
+    #[test]
+    fn what_a_fluid_damps_itself_is_not_damped_again() {
+        let of = |viscosity: f64| Scales {
+            rest_density: 1000.0,
+            particle_mass: 1e-3,
+            support_radius: 0.03,
+            viscosity,
+            surface_tension: 0.0,
+            expected_speed: 3.0,
+            sticks: false,
+        };
+        for (gradients, usual) in [(Gradients::Pairs, PAIRS_ALPHA), (Gradients::Differences, 0.02)] {
+            let wcsph = Wcsph { gradients, ..Wcsph::default() };
+            let alpha = |viscosity: f64| wcsph.artificial_viscosity(&of(viscosity));
+            let own = 1000.0 * roughness::viscosity(usual, wcsph.sound_speed(&of(0.0)), 0.03);
+            assert_eq!((alpha(0.0), alpha(1e-3)), (usual, usual));
+            for part in [0.25, 0.9] {
+                assert!((alpha(part * own) - (1.0 - part) * usual).abs() < 1e-12 * usual, "{part}");
+            }
+            assert_eq!((alpha(own), alpha(10.0 * own)), (0.0, 0.0));
+        }
+        let stated = Wcsph { artificial_viscosity: Some(0.1), ..Wcsph::default() };
+        assert_eq!(stated.artificial_viscosity(&of(1e3)), 0.1);
     }
 }

@@ -23,7 +23,7 @@ impl Numbers {
         Self {
             sound_speed: parameters.sound_speed(),
             density_diffusion: wcsph.density_diffusion(&parameters.scales()),
-            artificial_viscosity: wcsph.artificial_viscosity(),
+            artificial_viscosity: wcsph.artificial_viscosity(&parameters.scales()),
             gradients: wcsph.gradients,
             shifting: wcsph.shifting(),
             negative_pressure: wcsph.negative_pressure,
