@@ -4,14 +4,8 @@ use std::ops::ControlFlow;
 
 use rfm::glam::DVec3;
 use rfm::sph::Simulation;
-use rfm::{Engine, Experiment, Program};
 
-fn simulation(text: &str) -> Simulation {
-    let program = Program::from_source("still.rfm", text).unwrap_or_else(|e| panic!("{e}"));
-    let scene = &program.module().scenes[0];
-    let experiment = Experiment::new(&program, &scene.name, Engine::Auto).unwrap_or_else(|e| panic!("{e}"));
-    experiment.start().unwrap_or_else(|e| panic!("{e}")).simulation
-}
+use crate::tool::simulation;
 
 /// A column of eight particles by eight, so many layers deep.
 fn column(layers: u32) -> String {

@@ -92,3 +92,12 @@ pub fn snapshot(topic: &str, name: &str, text: &str) {
     settings.set_omit_expression(true);
     settings.bind(|| insta::assert_snapshot!(name.replace(' ', "_"), text));
 }
+
+/// The simulation of the first scene of a text, at its start.
+pub fn simulation(text: &str) -> rfm::sph::Simulation {
+    let program = rfm::Program::from_source("scene.rfm", text).unwrap_or_else(|e| panic!("{e}"));
+    let scene = &program.module().scenes[0];
+    let experiment =
+        rfm::Experiment::new(&program, &scene.name, rfm::Engine::Auto).unwrap_or_else(|e| panic!("{e}"));
+    experiment.start().unwrap_or_else(|e| panic!("{e}")).simulation
+}

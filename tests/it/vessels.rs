@@ -2,14 +2,8 @@
 
 use rfm::glam::DVec3;
 use rfm::sph::Simulation;
-use rfm::{Engine, Experiment, Program};
 
-fn simulation(text: &str) -> Simulation {
-    let program = Program::from_source("vessel.rfm", text).unwrap_or_else(|e| panic!("{e}"));
-    let scene = &program.module().scenes[0];
-    let experiment = Experiment::new(&program, &scene.name, Engine::Auto).unwrap_or_else(|e| panic!("{e}"));
-    experiment.start().unwrap_or_else(|e| panic!("{e}")).simulation
-}
+use crate::tool::simulation;
 
 fn run_to(simulation: &mut Simulation, time: f64) {
     while simulation.time() < time {

@@ -1,5 +1,6 @@
 //! The audit against runs whose energy, volume and speeds are known.
 
+use super::compression::CLASS;
 use super::*;
 use crate::geom::Aabb;
 use crate::sph::{Dfsph, FluidBlock, Method, Paper, Simulation, Wcsph, scenes};

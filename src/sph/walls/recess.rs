@@ -1,7 +1,7 @@
 //! What walls take of a kernel in sums over a fluid's lattice, where only integrals over the walls are known and not their
 //! faces.
 //!
-//! Of a body that is known by its volume, λ says how much of a kernel it takes, and T = ∮ W·y·n over its surface, which is
+//! For a body that is known by its volume, λ says how much of a kernel it takes, and T = ∮ W·y·n over its surface, which is
 //! tr K − 3λ, tells by how many faces. A plane at the distance δ has T = δ·A(δ). The edge of a vessel with the same λ lies farther
 //! away, along two normals, and has more: T = Σ δ_i·A_i·(1 − λ_j) for two planes at a right angle, and so on for the three of
 //! a corner. What bodies take is therefore placed between a plane, two equal planes and three equal ones by its T.
