@@ -1,4 +1,4 @@
-//! The state from which a run goes on bit for bit, and its form in bytes.
+//! The state from which a run continues bit for bit, and its form in bytes.
 //!
 //! ```text
 //! "rfm run\n" │ version u32 │ fingerprint [u8; 32] │ steps u64 │ time f64 │ particles u64, their ids u32 …
@@ -6,8 +6,8 @@
 //! ```
 //!
 //! Numbers are little-endian and keep all their digits. Particles stand in the solver's order, because the
-//! order of sums decides their last digit. Columns have names, so that each method keeps what it needs and no
-//! more, and a caller can add its own.
+//! order of sums decides their last digit. Columns have names, so each method keeps only what it needs, and a
+//! caller can add its own.
 //!
 //! Invariant: bytes that were cut off or changed are never taken for a checkpoint.
 
@@ -37,7 +37,8 @@ pub(super) const VECTORS: [&str; 9] = [
 /// The state of a simulation between two steps.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Checkpoint {
-    /// Fingerprint of all that must not change when a run goes on. The caller sets and compares it.
+    /// Fingerprint of everything that must not change when a run is continued. The caller sets and compares
+    /// it.
     pub fingerprint: [u8; 32],
     /// Number of steps taken.
     pub steps: u64,
@@ -157,7 +158,7 @@ impl Checkpoint {
     /// [`CheckpointError`] says why the bytes are not one.
     pub fn read(bytes: &[u8]) -> Result<Self, CheckpointError> {
         let rest = bytes.strip_prefix(&MAGIC).ok_or(CheckpointError::Foreign)?;
-        // check the version first: another one may have another checksum
+        // check the version first: other versions may have other checksums
         let version = rest.first_chunk().map(|bytes| u32::from_le_bytes(*bytes));
         if let Some(version) = version.filter(|version| *version != VERSION) {
             return Err(CheckpointError::Version(version));

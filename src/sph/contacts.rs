@@ -1,5 +1,5 @@
-//! Impulses that obstacles take from particles that they push or that hit them, and the work of those that move, as threads
-//! find them during a step.
+//! Impulses that obstacles take from particles that they push or that hit them, and the work of those that
+//! move, as threads find them during a step.
 
 use std::sync::{Mutex, PoisonError};
 
@@ -16,7 +16,7 @@ pub struct Contacts {
     now: Mutex<Vec<Hit>>,
     /// Work on particles in the present step, J/kg, with their indices.
     work_now: Mutex<Vec<(usize, f64)>>,
-    /// Work of walls that move on the fluid, J, that was not taken yet.
+    /// Work of moving walls on the fluid, J, that was not fetched yet.
     work: f64,
 }
 
@@ -78,7 +78,7 @@ impl Contacts {
         self.work += mass * now.drain(..).map(|(_, work)| work).sum::<f64>();
     }
 
-    /// The work of walls that move on the fluid, J, since this was asked last.
+    /// The work of moving walls on the fluid, J, since the last call.
     pub fn take_work(&mut self) -> f64 {
         std::mem::take(&mut self.work)
     }

@@ -25,8 +25,8 @@ use super::{
 /// Number of particles that one task of a parallel loop handles.
 pub(super) const CHUNK: usize = 2048;
 
-/// A step shorter than this part of the longest so far leads nowhere: speeds have grown by a factor of 10⁶,
-/// or forces by 10¹².
+/// A step shorter than this part of the longest one so far makes a run useless: speeds have grown by a factor
+/// of 10⁶, or forces by 10¹².
 const SHORTEST: f64 = 1e-6;
 
 /// Part of the spacing that a body beside the fluid may move in one step, as far as a particle may.
@@ -314,7 +314,7 @@ impl Core {
     /// The step to take now, s, at most `most`.
     ///
     /// # Errors
-    /// [`StepError::Stalled`] if the step would be so short that it leads nowhere.
+    /// [`StepError::Stalled`] if the step would be so short that the run makes no progress.
     pub fn next_dt(&mut self, most: f64) -> Result<f64, StepError> {
         self.speed = longest(&self.particles.velocity);
         let stated = self.parameters.time_step;
@@ -331,7 +331,7 @@ impl Core {
         Ok(if most.is_finite() { most / (most / dt - 1e-9).ceil().max(1.0) } else { dt })
     }
 
-    /// The longest step, s, at most `usual` and `most`, in which no body passes the fluid by.
+    /// The longest step, s, at most `usual` and `most`, in which no body jumps past the fluid.
     fn dt_beside_bodies(&self, usual: f64, most: f64) -> f64 {
         let parameters = &self.parameters;
         let limits = StepLimits {
@@ -376,7 +376,7 @@ impl Core {
         Ok(())
     }
 
-    /// Whether anything acts on all of the fluid: gravity that stays, turns, or depends on the place.
+    /// Whether anything acts on all of the fluid: gravity that is constant, turns, or depends on the place.
     pub fn has_gravity(&self) -> bool {
         let Self { parameters, gravity_field, turning_gravity, .. } = self;
         parameters.gravity != DVec3::ZERO || gravity_field.is_some() || turning_gravity.is_some()

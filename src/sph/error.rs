@@ -7,7 +7,7 @@ use glam::DVec3;
 use super::checkpoint::CheckpointError;
 use crate::geom::Aabb;
 
-/// A parameter outside the values for which the method has a meaning.
+/// A parameter is outside the values for which the method is meaningful.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ParameterError {
     /// Name of the parameter: a field of [`Parameters`](super::Parameters), or a key of the method.
@@ -124,11 +124,11 @@ pub enum Cause {
         /// The point, m.
         at: DVec3,
     },
-    /// The step was short enough: values grew until they left the range of a double.
+    /// The step was short enough, but values grew until they left the range of a double.
     Overflow,
 }
 
-/// Why a step could not be completed. The state must not be used any more.
+/// Why a step could not be completed. The state must no longer be used.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum StepError {
     /// A quantity ceased to be finite.
@@ -149,7 +149,7 @@ pub enum StepError {
         /// The time, s.
         time: f64,
     },
-    /// Walls that move leave no room for a particle: they close on it, or pass over it in one step.
+    /// Moving walls leave no room for a particle: they close on it, or pass over it in one step.
     NoRoom {
         /// Number of the step.
         step: u64,

@@ -172,9 +172,9 @@ impl Wendland {
     }
 
     /// C = s²·Σ V·2(1 − cos πn_x)·∂²W/∂x² over a cubic lattice of the spacing s, with `ratio` spacings per
-    /// support radius. Under an even pressure p, planes of particles that are displaced in turns to the left and
-    /// to the right swing with ω² = C·p/(ρs²). Of all motions that leave every density as it is, this is the
-    /// fastest.
+    /// support radius. Under an even pressure p, planes of particles that are displaced in turns to the left
+    /// and to the right swing with ω² = C·p/(ρs²). Among all motions that leave every density as it is, this
+    /// is the fastest.
     pub fn lattice_stiffness(ratio: f64) -> f64 {
         if ratio > MOST_COUNTED {
             return 0.0;

@@ -47,14 +47,15 @@ pub struct Parameters {
     pub method: Method,
     /// How the walls of the box act on a fluid that moves along them. Obstacles have their own.
     pub slip: Slip,
-    /// Whether the fluid sticks to any wall, of the box or of an obstacle; a simulation looks for itself, too. Steps
-    /// that viscosity limits are shorter then, except with the paper's method.
+    /// Whether the fluid sticks to any wall, of the box or of an obstacle; a simulation also finds out by
+    /// itself. Steps that viscosity limits are shorter then, except with the paper's method.
     pub sticks: bool,
     /// Coefficient of friction μ of the container's walls: when a particle hits a wall, its speed along the
     /// wall falls by μ times the change of its velocity normal to the wall. Zero: no friction.
     pub wall_friction: f64,
-    /// Whether the fluid fills all room that the box and the obstacles leave, so that it has no surface. `dfsph` then packs
-    /// the particles at the start and makes them lighter, as far as they would be too dense otherwise.
+    /// Whether the fluid fills all room that the box and the obstacles leave, so that it has no surface.
+    /// `dfsph` then packs the particles at the start and makes them lighter, as far as they would be too
+    /// dense otherwise.
     pub fills_vessel: bool,
     /// Precision of the sums over neighbours. State and motion are always in `f64`. `f32` has seven digits,
     /// relative to a few support radii.
@@ -89,7 +90,7 @@ impl Parameters {
     /// Checks all parameters and the numbers of the method.
     ///
     /// # Errors
-    /// The first parameter that is not finite, or lies outside the values for which the method has a meaning.
+    /// The first parameter that is not finite, or lies outside the values for which the method is meaningful.
     pub fn validate(&self) -> Result<(), ParameterError> {
         let check = |name, found: f64, holds: bool, expected: &str| {
             if holds { Ok(()) } else { Err(ParameterError { name, found, expected: expected.into() }) }
@@ -114,7 +115,7 @@ impl Parameters {
         }
         self.method.check()?;
         self.method.numerics().validate(&self.scales())?;
-        // Kernels divide by h⁹: far from metres that leaves the range of a double.
+        // Kernels divide by h⁹: with other units than metres that may leave the range of a double.
         let weight = self.particle_mass * Kernels::new(self.support_radius).poly6(0.0);
         check(
             "support_radius",
@@ -164,8 +165,8 @@ impl Parameters {
         self.method.numerics().makes_room_at_start()
     }
 
-    /// The mean compression, as a part of the rest density, within which the method is to keep the fluid; `None` if it promises
-    /// none.
+    /// The mean compression, as a part of the rest density, within which the method is to keep the fluid;
+    /// `None` if it promises none.
     pub(super) fn kept_compression(&self) -> Option<f64> {
         self.method.numerics().kept_compression()
     }

@@ -1,4 +1,4 @@
-//! What walls do to particles in a step, noted for the obstacles that feel it, and for the work that it is.
+//! What walls do to particles in a step, noted for the force on obstacles and for the work of walls.
 
 use super::{
     contacts::Contacts,
@@ -9,9 +9,9 @@ use super::{
 /// Steps for which the work of several walls on a particle is divided once.
 const TURNS: u32 = 8;
 
-/// The notes of a step. Forces of particles on each other cancel, so with what walls add to these, and with contacts, the
-/// momentum of the fluid changes by gravity and by what is noted alone. What surface tension does where it meets a wall is not
-/// noted, nor the viscosity of a fluid along a wall on which it slips.
+/// The notes of a step. Forces of particles on each other cancel. So the momentum of the fluid changes only
+/// by gravity and by what is noted: the part of walls in these forces, and contacts. What surface tension
+/// does where it meets a wall is not noted, nor the viscosity of a fluid along a wall on which it slips.
 #[derive(Clone, Copy)]
 pub struct Reaction<'a> {
     core: &'a Core,
@@ -21,8 +21,8 @@ pub struct Reaction<'a> {
 }
 
 impl<'a> Reaction<'a> {
-    /// The notes of a step of the length `dt`, s; `None` if no probe asks for forces and no wall moves, if the method notes
-    /// none, or for the start of a run.
+    /// The notes of a step of the length `dt`, s; `None` if no probe asks for forces and no wall moves, if
+    /// the method notes none, or for the start of a run.
     pub fn of(core: &'a Core, dt: f64) -> Option<Self> {
         let is_noted = dt > 0.0 && core.parameters.method.numerics().notes_reactions();
         core.contacts.as_ref().filter(|_| is_noted).map(|contacts| Self { core, contacts, dt })
@@ -34,9 +34,9 @@ impl<'a> Reaction<'a> {
         (id + self.core.steps).is_multiple_of(u64::from(TURNS))
     }
 
-    /// Notes what walls do to a particle. For work alone, what only one wall can have done is not divided. To divide what several
-    /// did takes long: it is all taken for that of the one that moves, and in one of [`TURNS`] steps what is wrong with this
-    /// is found, and counts for all of them.
+    /// Notes what walls do to a particle. If only work is noted, a force that only one wall can have caused
+    /// is not divided. To divide a force of several walls takes long, so all of it counts as that of the
+    /// moving one. In one of [`TURNS`] steps the error of this is found, and applied to all of them.
     pub fn add(&self, i: usize, pushed: Pushed) {
         if pushed == Pushed::default() {
             return;

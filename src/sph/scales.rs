@@ -10,7 +10,7 @@ pub enum Slip {
     No,
 }
 
-/// What a method needs to know of the fluid to derive numbers of its own, in SI units.
+/// What a method needs to know about the fluid to derive numbers of its own, in SI units.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Scales {
     /// Rest density ρ₀, kg/m³.

@@ -42,8 +42,8 @@ pub struct Simulation {
 /// Name of the audit's memory in a checkpoint.
 const AUDIT: &str = "audit";
 
-/// Name of the mass of a particle in a checkpoint. It may differ from that of the scene, so that the fluid weighs
-/// what its shape does.
+/// Name of the mass of a particle in a checkpoint. It may differ from that of the scene, so that the fluid
+/// has the mass of its shape.
 const MASS: &str = "particle mass";
 
 impl Simulation {
@@ -93,8 +93,8 @@ impl Simulation {
         Ok(Self { core, scheme, audit })
     }
 
-    /// A simulation that goes on from a checkpoint. With the same parameters, box and obstacles, every later
-    /// step has the bits that it would have had without the interruption.
+    /// A simulation that continues from a checkpoint. With the same parameters, box and obstacles, every
+    /// later step has the bits that it would have had without the interruption.
     ///
     /// # Errors
     /// [`SetupError`] as for [`Simulation::new`], or if the checkpoint belongs to another method.
@@ -131,7 +131,7 @@ impl Simulation {
     /// Advances by one time step.
     ///
     /// # Errors
-    /// [`StepError`] if a value is not finite any more, steps have become too short, or the energy has doubled
+    /// [`StepError`] if a value became infinite or NaN, steps became too short, or the energy has doubled
     /// without work. Nothing is clamped to hide it.
     pub fn step(&mut self) -> Result<(), StepError> {
         self.step_at_most(f64::INFINITY)
@@ -141,10 +141,10 @@ impl Simulation {
     /// instant.
     ///
     /// # Errors
-    /// As [`Simulation::step`].
+    /// See [`Simulation::step`].
     pub fn step_at_most(&mut self, longest: f64) -> Result<(), StepError> {
-        // the whole step on threads of the pool: each of its many sums would have to be handed over to them else. A thread
-        // that waits may take a step of another simulation meanwhile
+        // the whole step runs on threads of the pool; otherwise each of its many sums would have to be handed
+        // over to them. A thread that waits may take a step of another simulation meanwhile
         rayon::scope(|_| self.take_step(longest))
     }
 
@@ -176,7 +176,7 @@ impl Simulation {
         &self.audit
     }
 
-    /// What a user must know about the simulation so far, each finding with a sentence.
+    /// Findings about the simulation so far that a user must know, each with a sentence.
     pub fn findings(&self) -> Vec<(Finding, String)> {
         self.audit.findings(self.core.parameters.kept_compression())
     }
@@ -215,7 +215,7 @@ impl Simulation {
     /// the way and may stop earlier. A time that is no number, or is not after the present one, asks for no step.
     ///
     /// # Errors
-    /// As [`Simulation::step`].
+    /// See [`Simulation::step`].
     pub fn advance(
         &mut self,
         end: f64,
@@ -253,7 +253,7 @@ impl Simulation {
         self.begin_audit();
     }
 
-    /// Begins the audit anew if what acts on the fluid is set before its first step.
+    /// Restarts the audit if what acts on the fluid is set before its first step.
     fn begin_audit(&mut self) {
         if self.core.steps == 0 {
             self.audit = Audit::start(&self.core, self.scheme.densities(&self.core));
@@ -269,11 +269,11 @@ impl Simulation {
         Ok(Gauge::beginning(probe, &self.core))
     }
 
-    /// Prepares a probe of a run that goes on from a checkpoint, with the [memory](Gauge::memory) that it had
-    /// then.
+    /// Prepares a probe of a run that continues from a checkpoint, with the [memory](Gauge::memory) that it
+    /// had then.
     ///
     /// # Errors
-    /// As [`Simulation::gauge`].
+    /// See [`Simulation::gauge`].
     pub fn gauge_at(
         &mut self,
         probe: Probe,

@@ -377,8 +377,8 @@ fn walls_give_a_particle_no_energy() {
     }
 }
 
-/// The rim of the pawn's collar is sharper than the kernel: closed forms for its faces have no common potential, and one
-/// particle doubled its energy there within a second.
+/// The rim of the pawn's collar is sharper than the kernel: closed forms for its faces have no common
+/// potential, and one particle doubled its energy there within a second.
 #[test]
 fn sharp_rims_give_a_particle_no_energy() {
     let pawn = Obstacle { restitution: 0.0, ..scenes::obstacle(&scenes::pawn()) };

@@ -66,11 +66,12 @@ _"#
     out.write_all(b"\n</AppendedData>\n</VTKFile>\n")
 }
 
-/// The largest rounding of places that is not seen, as a part of the distance between particles that fill the box around them.
+/// The largest rounding of places that is not visible, as a part of the distance between particles that fill
+/// the box around them.
 const UNSEEN: f64 = 1e-3;
 
-/// Whether 32-bit floats are enough for places: they are not for particles that are much closer to one another than to the
-/// origin.
+/// Whether 32-bit floats are enough for places: they are not for particles that are much closer to one
+/// another than to the origin.
 fn are_enough(places: &Vectors) -> bool {
     let within = places.iter().fold(Aabb::EMPTY, |within, p| within.union(&Aabb::new(p, p)));
     if within.is_empty() || !within.is_finite() {

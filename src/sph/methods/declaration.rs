@@ -78,8 +78,8 @@ pub struct FluidDefaults {
     pub viscosity: f64,
     /// Surface tension, N/m.
     pub surface_tension: f64,
-    /// How many particles fill the shape if the scene says neither that nor how large they are. `None`: as many as
-    /// fill it with a mass of 0.02 kg.
+    /// The number of particles that fill the shape if the scene states neither the number nor the size.
+    /// `None`: as many as fill it with a mass of 0.02 kg.
     pub particles: Option<usize>,
     /// Support radius of the kernel.
     pub support: Support,

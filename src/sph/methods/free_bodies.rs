@@ -1,12 +1,12 @@
 //! Bodies of fluid that touch no wall, as drops and jets do, and the balance of the forces within them.
 //!
-//! The tension of a closed surface has no resultant and no torque, ∮ κ n dA = 0 and ∮ x × κ n dA = 0, but a sum
-//! over particles has: a round drop set itself in motion and began to spin. Of all changes that take the
-//! resultant and the torque away, the least one, weighted by how far particles belong to the surface, is a rigid
-//! acceleration w·(α + β × (x − c)). It is a small part of the force, for each body on its own.
+//! The tension of a closed surface has no resultant and no torque, ∮ κ n dA = 0 and ∮ x × κ n dA = 0, but a
+//! sum over particles has: a round drop set itself in motion and began to spin. Among all changes that remove
+//! the resultant and the torque, the smallest one, weighted by how far particles belong to the surface, is a
+//! rigid acceleration w·(α + β × (x − c)). It is a small part of the force, for each body on its own.
 //!
-//! Two particles belong to one body if the cells of a grid of the support radius that hold them touch. Bodies
-//! that come so near to each other count as one a little early.
+//! Two particles belong to one body if the cells of a grid of the support radius that hold them touch. So
+//! bodies that approach each other count as one slightly too early.
 
 use std::collections::HashMap;
 
@@ -34,8 +34,8 @@ struct Body {
     inertia: DMat3,
 }
 
-/// Takes resultant and torque from the forces on bodies that touch no wall. `force` holds the force of each particle over
-/// its mass, `weight` how far it belongs to the surface.
+/// Removes the resultant and the torque from the forces on bodies that touch no wall. `force` holds the force
+/// of each particle over its mass, `weight` how far it belongs to the surface.
 pub(super) fn balance(core: &Core, force: &mut Vectors, weight: &[f64]) {
     let (of, count) = bodies(core);
     let mut bodies = vec![Body::default(); count];

@@ -1,10 +1,11 @@
 //! What a kernel misses before a free surface.
 //!
-//! A sum over neighbours takes the empty half before a surface for room: the outermost particles have four fifths
-//! of the density at rest, and may come nearer to each other until they have all of it. Surface tension pulls just
-//! there: it drew the outermost layers together until a drop was a seventh too small, its tension nearly twice too
-//! strong, and its surface too ragged for normals, so that it stirred itself without end. And water at rest sank by a
-//! twentieth while it did so. With what is missing added, a flat surface of a lattice is as dense as its depth.
+//! A sum over neighbours counts the empty half before a surface as free room: the outermost particles have
+//! four fifths of the density at rest, and may approach each other until they have all of it. Surface tension
+//! pulls just there. It drew the outermost layers together until a drop was a seventh too small, its tension
+//! nearly twice too strong, and its surface too ragged for normals, so that it stirred itself without end.
+//! Water at rest sank by a twentieth in the same way. With the missing part added, a flat surface of a
+//! lattice is as dense as its depth.
 //!
 //! What is missing follows from the normal: n = Σ V ∇W + ∇λ is zero in the depth, and before a flat surface both n and
 //! the missing part depend on the distance from it alone. Between the layers of a lattice the relation is
@@ -12,13 +13,13 @@
 
 use crate::sph::kernel::{Surface, Wendland};
 
-/// Normals of this length times h, and shorter ones, are disorder in the depth.
+/// Normals up to this length, times h, are disorder in the depth.
 const DISORDER: f64 = 0.1;
 
-/// Half of the kernel is missing where a particle lies in a flat surface, and no more is ever counted.
+/// Half of the kernel is missing where a particle lies in a flat surface. More is never counted.
 const MOST: f64 = 0.5;
 
-/// Layers that are looked at, at most.
+/// Maximum number of layers that are looked at.
 const LAYERS: usize = 4;
 
 /// The missing part of a kernel by the length of the normal.

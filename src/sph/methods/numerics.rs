@@ -1,4 +1,4 @@
-//! What the solver asks of a method's numbers: limits of the step, walls, pressures.
+//! What the solver needs to know about a method's numbers: limits of the step, walls, pressures.
 
 use std::f64::consts::PI;
 
@@ -117,8 +117,8 @@ pub(in crate::sph) trait Numerics: Sync {
         false
     }
 
-    /// Whether each step notes what walls do to particles, see `Reaction`. Without that, forces on obstacles are those of
-    /// contacts, and of the pressure in front of their surfaces.
+    /// Whether each step notes what walls do to particles, see `Reaction`. Without that, forces on obstacles
+    /// are those of contacts, and of the pressure in front of their surfaces.
     fn notes_reactions(&self) -> bool {
         false
     }

@@ -1,16 +1,17 @@
-//! The rough part of a motion, which is noise and which an artificial viscosity shall damp.
+//! The rough part of a motion, which is noise and which an artificial viscosity is to damp.
 //!
 //! ```text
 //! v′ = v − v̄,   v̄_i = Σ V v_j W / Σ V W, a step before
 //! Π_ij ∝ α·h·c·(that of v′_ij·d and v_ij·d which is nearer to zero; zero if their signs differ)
 //! ```
 //!
-//! An artificial viscosity of the whole motion brakes waves too: with α = 0.02 and twenty layers a free wave loses
-//! half of its height in five periods (`wcsph`). A velocity that is linear in space is its own mean v̄ in the depth of a
-//! fluid, so the viscosity of v′ leaves it alone, and damps a wave of length L by a part of the order (h/L)² of what it
-//! did. At a surface and beside walls the mean is one-sided, and smooth motion is damped a little there.
-//! Noise from particle to particle has no mean, and is damped as before. Pairs still exchange equal and opposite
-//! momenta along their lines, and each pair takes energy away, because v′·d never acts against v·d.
+//! An artificial viscosity of the whole motion brakes waves too: with α = 0.02 and twenty layers a free wave
+//! loses half of its height in five periods (`wcsph`). A velocity that is linear in space is its own mean v̄
+//! in the depth of a fluid, so the viscosity of v′ leaves it alone, and damps a wave of length L by a part of
+//! the order (h/L)² of what it did. At a surface and beside walls the mean is one-sided, and smooth motion is
+//! damped a little there. Noise from particle to particle has no mean, and is damped as before. Pairs still
+//! exchange equal and opposite momenta along their lines, and each pair takes energy away, because v′·d never
+//! acts against v·d.
 //!
 //! The mean is that of the step before, which the same sum finds on its way. In one step the noise of
 //! velocities changes little, and what gravity adds is the same for all.
@@ -46,7 +47,8 @@ impl Roughness {
         Self { smooth, rough: Vectors::default() }
     }
 
-    /// Splits the velocities of a step, and returns their rough parts, and where a sum shall put the smooth ones.
+    /// Splits the velocities of a step, and returns their rough parts, and where a sum is to put the smooth
+    /// ones.
     pub fn split(&mut self, velocity: &Vectors) -> (&Vectors, &mut Vectors) {
         set_sum(&mut self.rough, velocity, &self.smooth, -1.0);
         (&self.rough, &mut self.smooth)
@@ -79,8 +81,9 @@ impl Roughness {
     }
 }
 
-/// The factor α·h/2·c of an artificial viscosity, m²/s, or as much of it as noise bears in a step of the length `dt`: with a
-/// greater one the step would turn noise round and make it grow. The limit is that of a viscosity ν = factor/10.
+/// The factor α·h/2·c of an artificial viscosity, m²/s, or as much of it as noise bears in a step of the
+/// length `dt`: with a greater one the step would turn noise round and make it grow. The limit is that of a
+/// viscosity ν = factor/10.
 pub(super) fn factor(alpha: f64, sound_speed: f64, support_radius: f64, dt: f64) -> f64 {
     let smoothing = 0.5 * support_radius;
     (alpha * smoothing * sound_speed).min(10.0 * smoothing.powi(2) / (24.0 * dt))

@@ -9,7 +9,7 @@ pub(in crate::sph) trait Scheme: Send + Sync {
     /// Advances by one step of at most `longest` seconds, and returns how long it was.
     ///
     /// # Errors
-    /// [`StepError`] if a value is not finite any more, or steps have become too short.
+    /// [`StepError`] if a value became infinite or NaN, or steps became too short.
     fn step(&mut self, core: &mut Core, longest: f64) -> Result<f64, StepError>;
 
     /// Puts into a checkpoint what the next step needs besides the particles and their accelerations.

@@ -28,7 +28,7 @@ use crate::sph::{
 };
 
 /// Limits of |n|·h: below the first a particle has no normal, from the second on it has one. A flat surface
-/// has 1.5 where the particle lies in it, and noise in the depth has some 0.05.
+/// has 1.5 where the particle lies in it, and noise in the depth has about 0.05.
 const NORMAL: [f64; 2] = [0.1, 0.3];
 
 /// A neighbourhood with less than this part of a full tangential moment has no curvature.

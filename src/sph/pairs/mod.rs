@@ -277,7 +277,7 @@ impl Cloud<'_> {
     }
 }
 
-/// Makes room for so many copies. The last register of a block may reach beyond them.
+/// Makes room for the given number of copies. The last register of a block may reach beyond them.
 fn make_room<T: Copy + Default>(values: &mut Vec<T>, count: usize) {
     let room = count + MOST_LANES;
     if values.len() < room {

@@ -5,9 +5,9 @@ use smallvec::SmallVec;
 
 use super::real::Real;
 
-/// Places within the radius of a register's particles. The ranges of copies are boxes, and about a third of the copies
-/// lies farther than the radius from the box around the particles. Of the others, another third is near that box and
-/// near none of the particles.
+/// Places within the radius of a register's particles. The ranges of copies are boxes, and about a third of
+/// the copies lies farther than the radius from the box around the particles. Another third is near that box,
+/// but near none of the particles.
 pub(super) struct Reach<'a, V> {
     here: &'a [V; 3],
     /// A bit for each particle.

@@ -9,7 +9,7 @@ pub(in crate::sph) trait Real:
     /// Rounds a number to this precision.
     fn of(x: f64) -> Self;
 
-    /// The same number in `f64`.
+    /// The number as `f64`.
     fn wide(self) -> f64;
 }
 

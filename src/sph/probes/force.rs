@@ -1,9 +1,9 @@
 //! The force of a fluid on an obstacle by its state alone: ∫ p n, and friction, over the pieces of its surface that the
 //! fluid touches.
 //!
-//! It is near the truth in a fluid at rest, and used where no step notes what walls do. In a jet on a plate of eight
-//! spacings, pressures of particles at the wall swing, and as they are never negative their mean is too large: this
-//! force was 1.8 times what the jet lost of its momentum.
+//! It is near the truth in a fluid at rest, and is used where no step notes what walls do. In a jet on a
+//! plate of eight spacings, pressures of particles at the wall oscillate. They are never negative, so their
+//! mean is too large: this force was 1.8 times the loss of the jet's momentum.
 //!
 //! The pressure of a piece is the mean of the particles in front of it, each continued to the piece by the balance
 //! of the fluid, ∇p = ρ(g − a), with the weights V·W (Shepard 1968). So a pressure that is linear in space gives its
@@ -29,14 +29,14 @@ use super::{
 /// Particles farther behind the plane of a piece than this part of the spacing lie on another side.
 const BEHIND: f64 = 0.1;
 
-/// A kernel of which less than this part is filled, in front of a piece and outside walls, counts as filled by so
-/// much with a fluid without pressure: the surface of the fluid, and spray.
+/// A kernel that is filled less than this, in front of a piece and outside walls, counts as filled to this
+/// part with a fluid without pressure: the surface of the fluid, and spray.
 const FILLED: f64 = 0.5;
 
 /// A particle nearer than this part of the support radius counts as that far away for the slope of a velocity.
 const NEAREST: f64 = 0.1;
 
-/// A force and its moment about the origin → the force and its moment about a point.
+/// Turns a force and its moment about the origin into the force and its moment about a point.
 pub fn about([x, y, z, u, v, w]: [f64; 6], point: DVec3) -> [f64; 6] {
     let force = DVec3::new(x, y, z);
     let moment = DVec3::new(u, v, w) - point.cross(force);

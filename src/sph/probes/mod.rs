@@ -43,7 +43,8 @@ pub enum Probe {
         /// y of the place, m.
         y: f64,
     },
-    /// Pressure at a place, Pa; zero if no fluid is within the support radius. With `dfsph` it is a mean over several steps.
+    /// Pressure at a place, Pa; zero if no fluid is within the support radius. With `dfsph` it is a mean over
+    /// several steps.
     Pressure {
         /// The place, m.
         at: DVec3,
@@ -55,11 +56,11 @@ pub enum Probe {
     },
     /// Force of the fluid on an obstacle, N, and its torque about a point, N·m.
     ///
-    /// It is the momentum that the obstacle has taken from particles since the last sample, by pressure, friction and
-    /// contacts, over that time; with the paper's method there are contacts only. At the start, and for `wcsph` with
-    /// differences of pressure, whose forces do not cancel in pairs, pressure and friction are instead those of the particles
-    /// in front of the obstacle's faces. What surface tension does where the surface meets the obstacle does not count, so a
-    /// drop that hangs seems to push.
+    /// It is the momentum that the obstacle has taken from particles since the last sample, by pressure,
+    /// friction and contacts, over that time; with the paper's method there are contacts only. At the start,
+    /// and for `wcsph` with differences of pressure, whose forces do not cancel in pairs, pressure and
+    /// friction are instead those of the particles in front of the obstacle's faces. The force of surface
+    /// tension where the surface meets the obstacle does not count, so a hanging drop seems to push.
     Force {
         /// Number of the obstacle, from 0.
         obstacle: usize,
@@ -321,8 +322,8 @@ impl<'a> Neighbourhood<'a> {
     }
 }
 
-/// The mass flow through a plane. ∫ W over the plane is the slope of what a wall there would cover of the
-/// kernel.
+/// The mass flow through a plane. ∫ W over the plane is the slope of the part of the kernel that a wall there
+/// would cover.
 fn flux(core: &Core, point: DVec3, normal: DVec3) -> f64 {
     let Weight { kernel, h, .. } = Weight::of(core);
     let particles = core.particles.position.iter().zip(core.particles.velocity.iter());

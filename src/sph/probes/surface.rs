@@ -1,9 +1,9 @@
 //! The surface of an obstacle in pieces, as large as a third of the particles' spacing, where there is fluid
 //! near.
 //!
-//! Boxes that the field's range proves to hold no surface are dropped, the others are halved, and those of the
-//! last size cut by the surface ([`cut`]). A box whose corners lie on one side, but which may hold surface by
-//! the range, is looked into three sizes farther, so that plates down to a 24th of the spacing count.
+//! Boxes that the field's range proves to hold no surface are dropped, the others are halved, and those of
+//! the last size cut by the surface ([`cut`]). A box whose corners lie on one side, but which may hold
+//! surface by the range, is divided three times more, so that plates down to a 24th of the spacing count.
 
 use glam::DVec3;
 
@@ -13,7 +13,7 @@ use crate::{
     interval::Interval,
 };
 
-/// Part of the particles' spacing that a piece has at most.
+/// Greatest size of a piece, as a part of the particles' spacing.
 const FINENESS: f64 = 1.0 / 3.0;
 
 /// Halvings beyond the size of a piece, in search of thin parts.

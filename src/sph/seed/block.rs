@@ -16,7 +16,7 @@ use super::deepest::deepest;
 use super::error::SeedError;
 use super::rows::Rows;
 
-/// More lattice sites than this are a mistake in the scene, not a fluid.
+/// Greatest number of lattice sites. More of them are a mistake in the scene.
 pub const MAX_SITES: f64 = 5e7;
 
 /// Which part of a field's shape is filled if it has room for more particles than are wanted.
@@ -44,7 +44,7 @@ pub enum FluidShape<'a> {
         /// Which part is filled if there is more room than particles.
         fill: Fill,
     },
-    /// As many sites of a lattice as are wanted, those that lie deepest in the region where ω > 0.
+    /// The wanted number of sites of a lattice: those that lie deepest in the region where ω > 0.
     Deepest {
         /// Positive inside the shape.
         field: &'a dyn Field,
@@ -55,7 +55,7 @@ pub enum FluidShape<'a> {
     },
     /// The box that rows fill. They have a number and a size of their own.
     Rows(Rows),
-    /// A ball around a centre, as large as the number of particles makes it.
+    /// A ball around a centre, whose size follows from the number of particles.
     Drop {
         /// Centre of the ball, m.
         centre: DVec3,

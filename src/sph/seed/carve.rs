@@ -1,4 +1,5 @@
-//! What obstacles leave of a fluid at its start: particles inside are taken away, those beside a surface keep a distance.
+//! What obstacles leave of a fluid at its start: particles inside are taken away, those beside a surface keep
+//! a distance.
 
 use glam::DVec3;
 use smallvec::SmallVec;
@@ -56,12 +57,13 @@ pub fn carve(
     if carved.kept == 0 { Err(SeedError::NothingLeft(carved)) } else { Ok(carved) }
 }
 
-/// Takes those particles of a lattice that obstacles leave no room for: as many as the obstacles' volume in the fluid's shape
-/// has cells. Where obstacles cut cells, those sites stay that are farthest out; at equal distances some stay, evenly. At
-/// most a tenth of a spacing inside an obstacle they may stay, too. Particles nearer than `clearance`, m, move out to there,
-/// those inside half as far. (If all sites outside stayed and no other, a ball of five spacings
-/// would take 5 % more than its volume, and the fluid around it would be 0.4 % too dense: more than a weakly compressible
-/// fluid is compressed by its weight.)
+/// Removes the particles of a lattice for which obstacles leave no room. Their number is the number of cells
+/// in the obstacles' volume within the fluid's shape. Where obstacles cut cells, the sites farthest out stay;
+/// at equal distances some stay, spread evenly. Sites up to a tenth of a spacing inside an obstacle may stay,
+/// too. Particles nearer than `clearance`, m, move out to that distance, and those inside half as far. (If
+/// all sites outside stayed and no other, a ball of five spacings would take 5 % more than its volume, and
+/// the fluid around it would be 0.4 % too dense: more than a weakly compressible fluid is compressed by its
+/// weight.)
 ///
 /// # Errors
 /// [`SeedError::NothingLeft`] if no particle is left, [`SeedError::Undefined`] where an obstacle has no
@@ -157,9 +159,9 @@ fn surface(obstacle: &Obstacle, p: DVec3, reach: f64) -> Result<Option<Face>, Se
     })
 }
 
-/// Moves particles that are nearer to an obstacle than `clearance`, m, to that distance, and returns how many are removed
-/// because they have no room between two walls. A lattice that a surface cuts keeps its volume this way; if the others were
-/// removed, too, a gap would remain along the wall.
+/// Moves particles that are nearer to an obstacle than `clearance`, m, to that distance, and returns how many
+/// are removed because they have no room between two walls. A lattice that a surface cuts keeps its volume
+/// this way; if the others were removed, too, a gap would remain along the wall.
 pub fn make_room(particles: &mut Particles, domain: &Aabb, obstacles: &[Obstacle], clearance: f64) -> usize {
     move_out(particles, domain, obstacles, clearance, 0.0)
 }
@@ -177,7 +179,7 @@ fn move_out(
         let start = particles.position.get(i);
         let mut p = start;
         for obstacle in obstacles {
-            // a place without a value is told of when particles are carved
+            // a place without a value is reported when particles are carved
             let Ok(Some(face)) = surface(obstacle, p, clearance.max(depth)) else { continue };
             // from inside a particle comes to half of the clearance, because another is farther out
             let wanted = if face.distance > 0.0 { clearance } else { 0.5 * clearance };
@@ -185,7 +187,7 @@ fn move_out(
                 p += (wanted - face.distance) * face.normal;
             }
         }
-        // what an obstacle would move out of the box stays, unless the two leave it no room
+        // a particle that an obstacle would move out of the box stays, unless the two leave it no room
         let at = if domain.contains(p) { p } else { start };
         let slot = if p == start { None } else { slot(at, domain, obstacles, 2.0 * clearance) };
         match slot {
@@ -199,8 +201,9 @@ fn move_out(
     removed
 }
 
-/// The part of a spacing that two walls that face each other leave a particle at least. In a narrower slot most of the
-/// kernel's support is wall, and the pressure of the fluid beside it would throw the particle out.
+/// Least room, as a part of a spacing, that two walls facing each other leave a particle. In a narrower slot
+/// most of the kernel's support is wall, and the pressure of the fluid beside it would throw the particle
+/// out.
 const LEAST_SLOT: f64 = 0.75;
 
 /// The room between two walls that face each other.
@@ -242,7 +245,7 @@ fn slot(p: DVec3, domain: &Aabb, obstacles: &[Obstacle], most: f64) -> Option<Sl
     narrowest
 }
 
-/// The cosine between the normals of two walls that face each other, at most.
+/// Two walls face each other if the cosine between their normals is at most this.
 const OPPOSITE: f64 = -0.5;
 
 #[cfg(test)]
@@ -311,7 +314,8 @@ mod tests {
         }
     }
 
-    /// A particle between a floor and a slab above it: in a narrow slot there is none, in a wider one it lies in the middle.
+    /// A particle between a floor and a slab above it: in a narrow slot there is none, in a wider one it lies
+    /// in the middle.
     #[test]
     fn narrow_slots_hold_no_particle() {
         let spacing = 0.1;

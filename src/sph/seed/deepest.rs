@@ -1,8 +1,8 @@
 //! The sites of a lattice that fill a shape with a number of particles, each as large as a cell.
 //!
-//! A shape seldom has as many sites as its volume has cells. Those sites are taken that lie deepest, and so some just
-//! outside the surface stay, or some just inside it are left out. (If cells were made smaller until enough sites lay
-//! inside, a cylinder of five spacings would hold 10 % more than its room.)
+//! A shape seldom has as many sites as its volume has cells. The deepest sites are taken, so some just
+//! outside the surface stay, or some just inside it are left out. (If cells were made smaller until enough
+//! sites lay inside, a cylinder of five spacings would hold 10 % more than its room.)
 
 use glam::DVec3;
 
@@ -15,8 +15,8 @@ const MARGIN: f64 = 0.3;
 /// Depths that differ by less than this part of the spacing count as equal.
 const SAME_DEPTH: f64 = 1e-6;
 
-/// The sites, m, that lie deepest in a field, in their order. Their number may differ from that wanted where the lattice has no
-/// others near the surface.
+/// The sites, m, that lie deepest in a field, in their order. Their number may differ from that wanted where
+/// the lattice has no others near the surface.
 pub(super) fn deepest(
     field: &dyn Field,
     sites: Vec<DVec3>,
@@ -62,7 +62,7 @@ fn depth(field: &dyn Field, at: DVec3) -> Result<f64, SeedError> {
         return Err(SeedError::Undefined { at });
     }
     let depth = w / gradient.length();
-    // without a slope nothing tells the depth but the sign
+    // without a slope only the sign is known of the depth
     Ok(if depth.is_nan() { if w > 0.0 { f64::INFINITY } else { f64::NEG_INFINITY } } else { depth })
 }
 
@@ -71,7 +71,7 @@ mod tests {
     use super::*;
     use crate::field::Closures;
 
-    /// A cylinder of any radius and height, as its volume has cells.
+    /// A cylinder of any radius and height gets as many sites as its volume has cells.
     #[test]
     fn a_number_of_cells_fills_a_cylinder() {
         for (radius, height) in [(5.35, 22.3), (4.8, 7.9), (6.2, 10.5)] {

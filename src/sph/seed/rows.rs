@@ -1,16 +1,19 @@
-//! Rows of sites that fill a box with any number of particles: those of a lattice, but for a part of the rows which
-//! hold one site more than the others.
+//! Rows of sites that fill a box with any number of particles: those of a lattice, except that a part of the
+//! rows hold one site more than the others.
 //!
-//! A number of particles is seldom a product of three numbers. If the sites of the next larger lattice were left out that
-//! are too many, each cell would weigh more than its room: with 2.6 % of vacancies a fluid at rest begins by bursting.
+//! A number of particles is seldom a product of three numbers. If surplus sites of the next larger lattice
+//! were left out, each particle would have more mass than its cell has room: with 2.6 % of vacancies a fluid
+//! at rest bursts at the beginning.
 //!
-//! Invariant: there are exactly as many sites as are asked for, each row spans the box, and rows differ by one site.
+//! Invariant: the number of sites is exactly the wanted one, each row spans the box, and rows differ by at
+//! most one site.
 
 use glam::DVec3;
 
 use crate::geom::Aabb;
 
-/// How much worse rows of different length are than cells that are longer than wide by one part in their length.
+/// Penalty for rows of different length, relative to cells that are longer than wide by one part in their
+/// length.
 const UNEVEN: f64 = 1.0;
 
 /// How a fraction grows from row to row and from layer to layer so that its values are spread evenly over both: the
@@ -129,7 +132,7 @@ mod tests {
             assert_eq!(sites.len(), number);
             assert!(sites.iter().all(|&site| bounds.contains(site)));
             let middle = sites.iter().sum::<DVec3>() / number as f64 - 0.5 * (bounds.min + bounds.max);
-            // rows span the box, so only how the longer ones lie moves the middle
+            // rows span the box, so only the places of the longer ones move the middle
             assert!((middle / bounds.size()).abs().max_element() < 0.5 / (number as f64).cbrt(), "{middle}");
             if number >= 999 {
                 let cell = rows.cell();

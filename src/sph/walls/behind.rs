@@ -1,12 +1,12 @@
-//! The velocity that the fluid has behind walls. Only a fluid that must not be compressed asks for it, so that others carry
-//! none of this data.
+//! The velocity that the fluid has behind walls. Only a fluid that must not be compressed needs it; others
+//! carry none of this data.
 
 use glam::DVec3;
 
 use super::symmetric::Symmetric;
 
-/// What is known of the motion behind the faces near a particle, a part of [`super::Coverage`]. It is `()` for fluids that do
-/// not ask.
+/// What is known of the motion behind the faces near a particle, a part of [`super::Coverage`]. It is `()`
+/// for fluids that do not need it.
 pub(in crate::sph) trait Behind: Copy + Default {
     /// What is known of one face at rest, with its λ.
     fn of_face(part: f64, normal: DVec3) -> Self;
@@ -20,7 +20,8 @@ pub(in crate::sph) trait Behind: Copy + Default {
     /// What is known of bodies, with their λ and their K − λ·1, whose surface moves with a velocity, m/s.
     fn of_bodies(part: f64, normal: DVec3, spread: &Symmetric, velocity: impl FnOnce() -> DVec3) -> Self;
 
-    /// What is known of a box with bodies in it, whose K add up: all but the part of K is as two walls make it.
+    /// What is known of a box with bodies in it, whose K add up: everything but the part of K is as for two
+    /// walls.
     fn with_moments_of(self, of_box: &Self, bodies: &Self) -> Self;
 }
 
@@ -39,7 +40,7 @@ impl Behind for () {
 /// The directions across walls, and the velocities of walls with the weights that these have in K, across them alone.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub(in crate::sph) struct Carried {
-    /// Σ λ·n⊗n over the faces: what of λ·1 belongs to directions across walls.
+    /// Σ λ·n⊗n over the faces: the part of λ·1 that belongs to directions across walls.
     pub across: Symmetric,
     /// Σ λ·n⊗n·v, m/s.
     pub by_part: DVec3,

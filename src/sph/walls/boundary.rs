@@ -1,8 +1,9 @@
 //! Collision: particles that a step has carried into an obstacle or out of the box are put back.
 //!
 //! For each particle the solver keeps the radius of a ball that is proven to lie in the fluid, less the
-//! distance moved since. While it is positive, no obstacle is evaluated. Nor is one for a block of particles
-//! whose paths all lie in a box that the field's range proves to be fluid. Other paths are swept.
+//! distance moved since. While it is positive, no obstacle is evaluated. No obstacle is evaluated either for
+//! a block of particles whose paths all lie in a box that the field's range proves to be fluid. Other paths
+//! are swept.
 //!
 //! At a contact the particle stops on the surface, its velocity is reflected, and the rest of its path goes
 //! on along the surface. Without that, a sliding particle would touch at once in every step and never move.
@@ -46,13 +47,14 @@ pub(in crate::sph) const MARKED: usize = 32;
 /// larger ball is tested for being free.
 const REACH: f64 = 1e6;
 
-/// Distance of a particle from all obstacles that is not known. Any negative number means the same.
+/// Stands for an unknown distance of a particle from all obstacles. Any negative number means the same.
 pub(in crate::sph) const UNKNOWN: f64 = -1.0;
 
-/// How far from a wall of the box, over the support radius, a face of an obstacle may lie that ends there.
+/// An obstacle ends in a wall of the box if its face is within this distance from the wall, over the support
+/// radius.
 pub(super) const FLUSH: f64 = 1e-3;
 
-/// How much less than 1 the cosine of the angle between both may be.
+/// The cosine of the angle between that face and the wall may be less than 1 by this much.
 const LEVEL: f64 = 1e-6;
 
 /// The distance, over the support radius, of a face behind which all of a kernel lies.
@@ -68,11 +70,13 @@ pub struct Obstacle {
     pub field: Arc<dyn Walls>,
     /// The motion of the body; `None` if it is at rest.
     pub moving: Option<Arc<dyn Moving>>,
-    /// The parts of a body that moves, if they move differently and each without deformation; empty if it moves as a whole,
-    /// or if that is not known. What it takes of the kernels of particles then follows from its volume.
+    /// The parts of a body that moves, if they move differently and each without deformation; empty if it
+    /// moves as a whole, or if that is not known. The part of kernels that they take then follows from their
+    /// volume.
     pub parts: Vec<RigidPart>,
-    /// How often a body that changes its shape is looked at for what it takes of the kernels of particles. Without it that
-    /// follows from its faces, in closed forms that hold where they are hardly bent within a support radius.
+    /// How often the part of kernels is found that a body takes which changes its shape. If it is `None`,
+    /// that part follows from the faces, in closed forms that hold where faces are hardly bent within a
+    /// support radius.
     pub changing: Option<ChangingShape>,
     /// Restitution c_R, 0 (stick) to 1 (mirror).
     pub restitution: f64,
@@ -86,9 +90,9 @@ pub struct Obstacle {
     pub resolution: f64,
     /// How the body acts on a fluid that moves along it.
     pub slip: Slip,
-    /// Motion of the surface within itself, m/s, as that of a belt. It takes along a fluid that sticks, in place of
-    /// what is known of the body's motion along its surface. It is evaluated at the places of particles near the
-    /// surface, so that the field of a body that turns does not rub on a fluid that turns with it.
+    /// Motion of the surface within itself, m/s, as that of a belt. It drags a fluid that sticks, in place of
+    /// the body's own motion along its surface. It is evaluated at the places of particles near the surface,
+    /// so that the field of a body that turns does not rub on a fluid that turns with it.
     pub surface_velocity: Option<Arc<VectorField>>,
 }
 
@@ -161,7 +165,7 @@ impl Boundary {
         }
     }
 
-    /// How far, m, a particle that a moving wall overtakes is moved at most.
+    /// The greatest distance, m, by which a particle that a moving wall overtakes is moved.
     pub(super) fn reach(&self) -> f64 {
         REACH * self.clearance
     }
@@ -176,8 +180,8 @@ impl Boundary {
         if self.obstacles[k].moving.is_some() { self.field(k).wall_velocity(p) } else { DVec3::ZERO }
     }
 
-    /// The velocity along an obstacle's surface near a point, m/s, of which only the part in the surface has a meaning: what
-    /// the scene states, or that of the body's motion.
+    /// The velocity along an obstacle's surface near a point, m/s: the one that the scene states, or that of
+    /// the body's motion. Only its part in the surface has a meaning.
     pub fn velocity_along(&self, k: usize, p: DVec3) -> DVec3 {
         match &self.obstacles[k].surface_velocity {
             Some(velocity) => velocity(p, self.time),
@@ -195,8 +199,8 @@ impl Boundary {
     /// its least distance from all obstacles, m, or [`UNKNOWN`]; it is empty if there are no obstacles.
     ///
     /// # Errors
-    /// The first particle, in the order of the arrays, at which a field is undefined or for which walls leave no
-    /// room.
+    /// Returns the first particle, in the order of the arrays, at which a field is undefined or for which
+    /// walls leave no room.
     pub fn collide(
         &self,
         position: &Vectors,
@@ -270,8 +274,8 @@ impl Boundary {
         self.maps = Maps::new(&obstacles, &self.domain, h, self.time);
     }
 
-    /// What the box and the obstacles take of the kernel of a particle; `None` if they are farther away than
-    /// h.
+    /// The parts of the kernel of a particle that the box and the obstacles take; `None` if they are farther
+    /// away than h.
     pub fn coverage<F: Friction, B: Behind>(&self, wall: &Wall, p: DVec3) -> Option<Coverage<F, B>> {
         let of_box = self.of_box::<F, B>(wall, p);
         if self.obstacles.is_empty() {
@@ -340,9 +344,9 @@ impl Boundary {
         whole
     }
 
-    /// Whether a face of an obstacle before a particle lies in a wall of the box and looks out of it. The obstacle is then taken
-    /// to go on behind that wall, as one that stands out of the box does: nothing can be seen of either end, and what is
-    /// behind the wall would otherwise count as a notch in both.
+    /// Whether a face of an obstacle before a particle lies in a wall of the box and looks out of it. The
+    /// obstacle is then assumed to continue behind that wall, as one that stands out of the box does. Neither
+    /// end can be seen, and the room behind the wall would otherwise count as a notch in both.
     pub(super) fn ends_at_box(&self, p: DVec3, face: &Face, h: f64) -> bool {
         let axis = face.normal.abs().max_position();
         let outwards = face.normal[axis];

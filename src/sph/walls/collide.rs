@@ -5,7 +5,7 @@ use glam::DVec3;
 use super::contact::{Contact, Undefined, bounce, push_out};
 use crate::field::{Normals, Walls};
 
-/// How walls answer to a particle that has entered them.
+/// How walls act on a particle that has entered them.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Rebound {
     restitution: f64,
@@ -42,13 +42,14 @@ pub enum Collision {
     Undefined,
 }
 
-/// Puts a particle that has entered walls (ω ≥ 0) back to the nearest place outside, and reflects its velocity relative to
-/// the surface's own. In a corner it keeps its speed towards none of the faces that it has passed. `None` if it is
-/// outside, unless its velocity is not finite.
+/// Puts a particle that has entered walls (ω ≥ 0) back to the nearest place outside, and reflects its
+/// velocity relative to the surface's own. In a corner it loses its speed towards all faces that it has
+/// passed. `None` if it is outside, unless its velocity is not finite.
 ///
-/// `walls` is a [`Solid`](crate::Solid), at the time of the particle if it moves, or what has its sign and its surface: that of
-/// [`Solid::surface`](crate::Solid::surface) is faster for many parts. Only places count, and not the way there: a
-/// particle that has passed a thin part is outside. [`first_contact`](super::first_contact) sees such a part.
+/// `walls` is a [`Solid`](crate::Solid), at the time of the particle if it moves, or a field with its sign
+/// and its surface: that of [`Solid::surface`](crate::Solid::surface) is faster for many parts. Only places
+/// count, not the way there: a particle that has passed a thin part is outside.
+/// [`first_contact`](super::first_contact) sees such a part.
 ///
 /// ```
 /// use rfm::{Program, glam::DVec3, sph::{Collision, Rebound, collide}};
@@ -95,9 +96,9 @@ pub fn put_back(
     Collision::Hit
 }
 
-/// The place outside that Newton's method finds behind a face, within some rounding errors of its surface. Most particles
-/// that are hit have passed one face: a flat one takes two gradients, a curved one four. `None` if another face is met on
-/// the way, or if no such place is found within reach.
+/// The place outside that Newton's method finds behind a face, within some rounding errors of its surface.
+/// Most particles that are hit have passed one face: a flat one takes two gradients, a curved one four.
+/// `None` if another face is met on the way, or if no such place is found within reach.
 fn through_one_face(walls: &dyn Walls, from: DVec3, reach: f64) -> Option<Contact> {
     let mut here = from;
     let mut first = None;
@@ -178,7 +179,7 @@ mod tests {
     use super::*;
     use crate::sph::scenes;
 
-    /// Also from the middle, where no gradient tells the way.
+    /// Works from the middle too, where the gradient vanishes.
     #[test]
     fn every_place_inside_a_ball_has_a_way_out() {
         let ball = scenes::sphere(DVec3::ZERO, 1.0);

@@ -18,8 +18,8 @@ use crate::field::{Entry, Normals, Path, Walls, last_outside};
 /// A bracket shorter than this part of the coordinates' size counts as a point.
 const POINT: f64 = 4.0 * f64::EPSILON;
 
-/// Most uncertain stretches of a path that samples may show to be free. A path with more of them counts as a
-/// contact.
+/// Maximum number of uncertain stretches of a path that samples may show to be free. A path with more of them
+/// counts as a contact.
 const MOST_DOUBTS: usize = 16;
 
 /// Where a path meets an obstacle.
@@ -158,7 +158,7 @@ pub fn push_out(
     push_out_to(field, inside, reach, clearance, |_| true)
 }
 
-/// The nearest place as by [`push_out`] that also fulfils a condition.
+/// The nearest place, as [`push_out`] finds it, that also fulfils a condition.
 ///
 /// # Errors
 /// [`Undefined`] where ω is NaN.

@@ -1,14 +1,15 @@
 //! The corner where two flat walls meet, as a particle in it sees it.
 //!
-//! The pressure of a fluid near a wall that stands alone adds up to p for each part of the wall's area, because a column of fluid
-//! above it takes ½ of a kernel, and the pressure counts twice. In a corner columns above a wall end at the other one, if the
-//! corner is acute, and if it is obtuse there is fluid without wall below it. So a particle presses on a wall if its foot is on
-//! it, and so does its mirror image behind the other wall. In a corner of a right angle that is what it does if the wall is alone.
-//! (Without this a wall of the corner θ is off by 0.21·cot θ·p·h for each part of the edge. Below 45° there are images of
-//! images, which are left out: there it is off by 0.21·cot 2θ·p·h.)
+//! The pressure of a fluid near a wall that stands alone adds up to p for each part of the wall's area,
+//! because a column of fluid above it takes ½ of a kernel, and the pressure counts twice. In an acute corner,
+//! columns above a wall end at the other wall; in an obtuse one, there is fluid without a wall below it. So a
+//! particle presses on a wall if its foot is on it, and so does its mirror image behind the other wall. In a
+//! right-angled corner that gives the same as a wall that is alone. (Without this a wall of the corner θ is
+//! off by 0.21·cot θ·p·h for each part of the edge. Below 45° there are images of images, which are left out:
+//! there it is off by 0.21·cot 2θ·p·h.)
 //!
-//! The places behind both faces lie in a wedge along the edge. Integrals along the edge and away from the particle come from
-//! a table, the one over the angle around the particle from a sum.
+//! The places behind both faces lie in a wedge along the edge. Integrals along the edge and away from the
+//! particle come from a table, the one over the angle around the particle from a sum.
 
 use std::f64::consts::PI;
 use std::sync::LazyLock;
@@ -18,7 +19,7 @@ use glam::{DMat3, DVec3};
 use super::symmetric::Symmetric;
 use crate::field::Face;
 
-/// The square of the sine of the angle, some ten degrees, from which on two faces meet in a corner.
+/// Two faces meet in a corner if the square of the sine of their angle is at least this, some ten degrees.
 const LEAST_SQUARED_SINE: f64 = 0.03;
 
 /// Rows of the table.
@@ -53,8 +54,8 @@ pub(super) struct Seen {
 }
 
 impl Corner {
-    /// The corner of two faces before a particle; `None` if they are nearly parallel, one of them is not before it, or what lies
-    /// behind both is beyond the support radius h, m.
+    /// The corner of two faces before a particle; `None` if they are nearly parallel, one of them is not
+    /// before it, or what lies behind both is beyond the support radius h, m.
     pub fn of(one: &Face, other: &Face, h: f64) -> Option<Self> {
         let cosine = one.normal.dot(other.normal);
         let squared_sine = 1.0 - cosine * cosine;
@@ -67,7 +68,8 @@ impl Corner {
         let along = into[0].cross(into[1]).normalize();
         let distance = distance.map(|distance| distance.max(h * ON_FACE));
         let corner = Self { distance, into, along, cosine, squared_sine };
-        // what is nearest of the places behind both: the foot on one of the faces, if that is behind the other, or the edge
+        // the nearest place behind both: the foot on one of the faces, if that is behind the other, or the
+        // edge
         let feet = [0, 1].map(|on| (corner.foot(on) < 0.0).then_some(distance[on]));
         let nearest = feet.into_iter().flatten().fold(f64::INFINITY, f64::min);
         let nearest = if nearest.is_finite() { nearest } else { corner.edge([0.0, 0.0]).length() };
@@ -82,8 +84,8 @@ impl Corner {
         along_one * self.into[0] + along_other * self.into[1]
     }
 
-    /// The distances, m, from which a particle presses on a wall, which is the first or the second of the faces: its own, and
-    /// that of its mirror image behind the other face, if their feet are on the wall.
+    /// The distances, m, from which a particle presses on a wall, which is the first or the second of the
+    /// faces: its own, and that of its mirror image behind the other face, if their feet are on the wall.
     pub fn pressing(&self, on: usize) -> [Option<f64>; 2] {
         let (to_wall, to_other) = (self.distance[on], self.distance[1 - on]);
         let foot = self.foot(on);
@@ -107,8 +109,8 @@ impl Corner {
         let edge = self.edge([0.0, 0.0]);
         let mut seen = Seen::default();
         for first in [0, 1] {
-            // angles around the particle, from the direction into the second wall towards that into the first, on that side of
-            // the edge on which the second face is the farther one
+            // angles around the particle, from the direction into the second wall towards that into the
+            // first, on that side of the edge on which the second face is the farther one
             let [to_first, to_second] = [self.into[first], self.into[1 - first]];
             let beside = (to_first - self.cosine * to_second) / self.squared_sine.sqrt();
             let depth = self.distance[1 - first] / h;
@@ -133,12 +135,12 @@ impl Corner {
     }
 }
 
-/// How far before a face, over the support radius, a particle is at least.
+/// Least distance of a particle before a face, over the support radius.
 const ON_FACE: f64 = 1e-6;
 
-/// Integrals over all places on a ray's half-plane, spanned by the ray and the edge's direction, that are farther than q from
-/// the line through the particle along the edge, for each angle: of |∇W| across that line, in 1/h, and of the components of
-/// y ⊗ ∇W across and along it.
+/// Integrals over all places on a ray's half-plane, spanned by the ray and the edge's direction, that are
+/// farther than q from the line through the particle along the edge, for each angle: of |∇W| across that
+/// line, in 1/h, and of the components of y ⊗ ∇W across and along it.
 struct Table {
     rows: [[f64; 3]; ROWS + 1],
 }

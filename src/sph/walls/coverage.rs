@@ -33,7 +33,7 @@ use super::{
 /// Curvatures, in units of 1/h, are cut off here: the series behind the correction does not hold beyond.
 const MOST_CURVED: f64 = 0.4;
 
-/// Parts of a kernel below this are nothing.
+/// Parts of a kernel below this count as zero.
 const LEAST_TAKEN: f64 = 1e-9;
 
 /// Integrals of a kernel over the walls near a particle.
@@ -90,7 +90,7 @@ impl<F: Friction, B: Behind> Coverage<F, B> {
         }
     }
 
-    /// Lets all of these walls move with one velocity, m/s. Friction is told apart.
+    /// Lets all of these walls move with one velocity, m/s. Friction is handled separately.
     pub fn set_in_motion(&mut self, velocity: DVec3) {
         self.sweep = self.gradient.dot(velocity);
         self.behind.set_in_motion(&self.spread, velocity);
@@ -207,11 +207,12 @@ impl<F: Friction, B: Behind> Coverage<F, B> {
 impl<B: Behind> Coverage<(), B> {
     /// Adds bodies whose volume is known to these walls of the box, which are `continuous` if they are not in layers.
     ///
-    /// The bodies take the part b of what the box leaves. What else a wall has follows from its distance. That of the
-    /// bodies is the distance of a plane which takes as much, or of the planes of an edge or a corner, see [`Recess`]; its
-    /// gradient along the way is that of b. What faces the box takes nothing that the box might have: there b is all that the
-    /// bodies take, by the weight of [`Coverage::and`], for walls in layers. (A particle in the middle of a gap half a spacing
-    /// high, between floor and body, was driven against the body.)
+    /// The bodies take the part b of what the box leaves. The other figures of a wall follow from its
+    /// distance. For bodies this is the distance of a plane that takes as much, or of the planes of an edge
+    /// or a corner, see [`Recess`]; its gradient along the way is that of b. For walls in layers, a body that
+    /// faces the box takes nothing that the box might have: there b is all that the bodies take, by the
+    /// weight of [`Coverage::and`]. (A particle in the middle of a gap half a spacing high, between floor and
+    /// body, was driven against the body.)
     pub fn with_bodies(&self, wall: &Wall, continuous: &Coverage, taken: &Taken) -> Self {
         let shared = if wall.layer.is_some() {
             1.0 - facing(cosine_between(continuous.gradient, taken.gradient))
@@ -230,7 +231,7 @@ impl<B: Behind> Coverage<(), B> {
         let Recess { part: of_layered, filled, barrier, of_part, of_barrier, of_layers } =
             wall.recess(part, support);
         let normal = gradient.normalize_or_zero();
-        // of bodies that change their shape the motion of the surface is known
+        // for bodies that change their shape the motion of the surface is known
         let velocity = || {
             let steep = gradient.length();
             let of_surface = if steep > 0.0 { sweep / steep * normal } else { DVec3::ZERO };
@@ -250,7 +251,8 @@ impl<B: Behind> Coverage<(), B> {
             behind: B::of_bodies(part, normal, &spread, velocity),
         };
         let (da, db) = (1.0 - shared * bodies.part, 1.0 - shared * self.part);
-        // there is no more than the whole kernel; that the weight of facing walls changes with the place is left out of gradients
+        // there is no more than the whole kernel; that the weight of facing walls changes with the place is
+        // left out of gradients
         let whole = self.joined(&bodies, |_, _| ((self.part + db * bodies.part).min(1.0), da, db));
         // K of bodies in the box adds to that of the box
         let behind = whole.behind.with_moments_of(&self.behind, &bodies.behind);
@@ -259,8 +261,8 @@ impl<B: Behind> Coverage<(), B> {
 }
 
 impl<F> Coverage<F, Carried> {
-    /// The velocity that the fluid behind the walls has, m/s, by that of the walls across them and by one along them, m/s:
-    /// the solution r of K·r = Σ (K_n·v + λ·(1 − n⊗n)·along) over the walls.
+    /// The velocity that the fluid behind the walls has, m/s, by that of the walls across them and by one
+    /// along them, m/s: the solution r of K·r = Σ (K_n·v + λ·(1 − n⊗n)·along) over the walls.
     pub fn velocity_behind(&self, along: DVec3) -> DVec3 {
         let Carried { across, by_part, by_spread } = self.behind;
         let moment = self.part * Symmetric::IDENTITY + self.spread;
@@ -281,7 +283,7 @@ impl Barrier {
     }
 }
 
-/// Cosine of the angle between two directions; 0 if one of them is none.
+/// Cosine of the angle between two directions; 0 if one of them vanishes.
 fn cosine_between(a: DVec3, b: DVec3) -> f64 {
     let lengths = (a.length_squared() * b.length_squared()).sqrt();
     if lengths > 0.0 { (a.dot(b) / lengths).clamp(-1.0, 1.0) } else { 0.0 }
@@ -426,8 +428,9 @@ mod tests {
         }
     }
 
-    /// A wall that lets the fluid slip stands for the same flow once more behind it. So beside such walls the friction of
-    /// another wall is what it is far from them, and that within the fluid is a sum over what they have left.
+    /// A wall that lets the fluid slip stands for the mirrored flow behind it. So beside such walls the
+    /// friction of another wall is the same as far from them, and friction within the fluid is a sum over
+    /// what they have left.
     #[test]
     fn slippery_walls_do_not_change_the_friction_of_others() {
         let viscosity = 0.3;
@@ -477,8 +480,8 @@ mod tests {
         }
     }
 
-    /// Walls that all move with one velocity have it behind them, and so has what slips along them with it: on one wall, in
-    /// corners, between walls, and behind the edge of two.
+    /// Walls that all move with one velocity have it behind them, and so has what slips along them with it:
+    /// on one wall, in corners, between walls, and behind the edge of two.
     #[test]
     fn what_moves_as_one_has_one_velocity_behind_its_walls() {
         let velocity = DVec3::new(2.0, -1.0, 0.5);
@@ -507,8 +510,8 @@ mod tests {
         assert!((behind - DVec3::new(2.0, 3.0, 4.0)).length() < 1e-9, "{behind}");
     }
 
-    /// Between two walls, in an edge and in a corner no direction is stretched beyond the limit, and those in which a single
-    /// wall stretches keep what it makes of them.
+    /// Between two walls, in an edge and in a corner no direction is stretched beyond the limit, and
+    /// directions in which a single wall stretches keep its stretching.
     #[test]
     fn no_direction_is_stretched_beyond_the_limit() {
         let across = Symmetric::square(DVec3::new(0.6, 0.8, 0.0));

@@ -8,10 +8,10 @@ use super::{
 };
 use crate::field::Path;
 
-/// Most contacts of one particle in one step. After them it stays where it is.
+/// Maximum number of contacts of one particle in one step. After them it stays where it is.
 const MAX_CONTACTS: usize = 4;
 
-/// The part of a step in which a wall that moves is no longer met: too little to tell where a path began.
+/// The part of a step in which a wall that moves is no longer met: too little to know where a path began.
 const LEAST_LEFT: f64 = 1e-6;
 
 /// Where a particle's path ends.
@@ -26,8 +26,8 @@ impl Boundary {
     /// Where the path of a particle ends, and the velocity there. `hit` is called for each contact with the
     /// obstacle's number, the change of velocity, the velocity of the wall, and the place.
     ///
-    /// A wall that moves takes the particle with it for the rest of the step: what is left of the path is passed relative to
-    /// the wall, and searched from the instant of the contact on.
+    /// A wall that moves takes the particle with it for the rest of the step: what is left of the path is
+    /// passed relative to the wall, and searched from the instant of the contact on.
     pub(super) fn resolve(
         &self,
         from: DVec3,
@@ -70,7 +70,7 @@ impl Boundary {
             }
             hit(index, velocity - before, wall, contact.point);
         }
-        // a wall that moves on may pass what cannot go on
+        // a wall that keeps moving may pass a particle that cannot go on
         let is_proven = self.stays_outside(here, since)?;
         Ok(End { at: here, velocity, is_proven })
     }
@@ -86,8 +86,8 @@ impl Boundary {
         Ok(true)
     }
 
-    /// A place beside the end of a path that is inside an obstacle after a contact, and the normal there: on the side of the
-    /// contact, not behind a wall that moves.
+    /// A place beside the end of a path that is inside an obstacle after a contact, and the normal there: on
+    /// the side of the contact, not behind a wall that moves.
     fn lifted(
         &self,
         index: usize,

@@ -11,10 +11,10 @@
 //! Aᵥ   = (525/2)·[1/140 − δ²/10 − (13/12)δ⁴ − δ⁴ ln δ + (8/5)δ⁵ − δ⁶/2 + (8/105)δ⁷]     (Wendland C2)
 //! ```
 //!
-//! in place of A, to which it is equal in the mean: ∫Aᵥ dδ = ∫A dδ = ½. The velocity of a fluid bends towards the wall
-//! (a channel's is a parabola). By its second derivative along the normal, which is the acceleration a over ν, it is ahead of
-//! the linear one behind the wall by a/2ν·s(s − d). The part of a that this adds is m·a, so a is what pairs and the linear
-//! velocity give, over 1 − m:
+//! in place of A, to which it is equal in the mean: ∫Aᵥ dδ = ∫A dδ = ½. The velocity of a fluid bends towards
+//! the wall (a channel's is a parabola). By its second derivative along the normal, which is the acceleration
+//! a over ν, it is ahead of the linear one behind the wall by a/2ν·s(s − d). The part of a that this adds is
+//! m·a, so a is what pairs and the linear velocity give, over 1 − m:
 //!
 //! ```text
 //! m = 5 ∫_{s>d} y²·s(s − d)·|W'|/r³ dV     (y along the wall)
@@ -82,8 +82,8 @@ impl Friction for () {
     }
 }
 
-/// The friction of a viscous fluid with walls. Walls to which it sticks and walls along which it slips combine among
-/// themselves: behind the latter the whole flow goes on, friction included.
+/// The friction of a viscous fluid with walls. Walls to which it sticks and walls along which it slips
+/// combine among themselves: behind the latter the whole flow continues, friction included.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub(in crate::sph) struct WallDrag {
     /// Σ (Aᵥ/h)/d·(1 − n⊗n), 1/m², over the faces to which the fluid sticks. Times −2ν and a velocity it is
@@ -137,7 +137,7 @@ impl Friction for WallDrag {
 }
 
 impl WallDrag {
-    /// The acceleration by the fluid, which goes on behind walls along which it slips.
+    /// The acceleration by the fluid, which continues behind walls along which it slips.
     fn mirrored(&self, drag: DVec3) -> DVec3 {
         drag / (1.0 - self.slippery).max(LEAST_FREE)
     }
@@ -173,8 +173,8 @@ fn beyond_lines(delta: f64) -> f64 {
 mod tests {
     use super::*;
 
-    /// ∫ |W'|/r³·f(r, cos) dV over the part of the support behind a plane at the distance d, by shells and, within them,
-    /// rings; cos is that of the angle to the normal.
+    /// ∫ |W'|/r³·f(r, cos) dV over the part of the support behind a plane at the distance d, by shells and,
+    /// within them, rings; cos is that of the angle to the normal.
     fn behind_a_plane(d: f64, f: impl Fn(f64, f64) -> f64) -> f64 {
         let (n, rings) = (4000, 200);
         let step = (1.0 - d) / f64::from(n);

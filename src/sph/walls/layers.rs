@@ -23,9 +23,9 @@ pub(in crate::sph) struct Wall {
     pub spacing: f64,
     /// λ at half a spacing from a wall in layers, where a fluid rests.
     pub at_rest: f64,
-    /// How many times λ of layers a lattice behind the face has of the kernel's sum, half a spacing before it: layers
-    /// are planes and a lattice is points. With 2.2 spacings per support radius it is 0.975, with 3 it is 0.997, and no
-    /// more than 1 is counted.
+    /// The kernel's sum over a lattice behind a face, half a spacing before the face, divided by λ of layers:
+    /// layers are planes and a lattice is points. With 2.2 spacings per support radius it is 0.975, with 3 it
+    /// is 0.997, and at most 1 is counted.
     pub lattice_over_layers: f64,
 }
 
@@ -41,21 +41,21 @@ pub(in crate::sph) struct OfFace {
     /// What a wall adds to the sum over a lattice of particles, of which the first layer is half a spacing away: λ by
     /// layers a spacing apart, as a lattice has it.
     pub filled: f64,
-    /// B, what a wall in layers adds to the density of a fluid that must not be compressed. It is what a lattice adds, and
-    /// nearer than half a spacing, where a fluid at rest touches the wall, λ counts twice: the wall mirrors the fluid. Over
-    /// a width of two [`BEND`] it bends from the one to the other. (Without the mirror the fluid creeps into the walls,
-    /// and a level of ten layers sinks by 3 %. With a kink instead of the bend water at rest never comes to rest. With λ
-    /// of layers instead of a lattice's part the first layer is 0.9 % too dense, and a deep column that rises by that
-    /// much bursts.)
+    /// B, what a wall in layers adds to the density of a fluid that must not be compressed. It is what a
+    /// lattice adds, and nearer than half a spacing, where a fluid at rest touches the wall, λ counts twice:
+    /// the wall mirrors the fluid. Over a width of two [`BEND`] it bends from the one to the other. (Without
+    /// the mirror the fluid creeps into the walls, and a level of ten layers sinks by 3 %. With a kink
+    /// instead of the bend water at rest never comes to rest. With λ of layers instead of a lattice's part
+    /// the first layer is 0.9 % too dense, and a deep column that rises by that much bursts.)
     pub barrier: f64,
     /// −h·dB/dd.
     pub barrier_area: f64,
 }
 
-/// From so many spacings per support radius on sums over lattices are integrals.
+/// From this number of spacings per support radius on, integrals replace sums over lattices.
 const LONGEST_SUM: f64 = 8.0;
 
-/// Most steps in search of a distance.
+/// Maximum number of steps in search of a distance.
 const MOST_STEPS: usize = 30;
 
 /// A step of that search, as a part of 1 − δ, whose square is rounding.
@@ -75,7 +75,7 @@ impl Wall {
         // wide kernels know no difference between planes and points
         if spacing * LONGEST_SUM > 1.0 {
             let layers = wall.by_layers(0.5 * spacing);
-            // in kernels that hardly reach the first layer planes are no measure
+            // kernels that hardly reach the first layer say nothing about planes
             let lattice = kernel.lattice_behind(1.0 / spacing) / layers;
             wall.lattice_over_layers = if layers > 0.0 { lattice.min(1.0) } else { 1.0 };
         }
@@ -116,7 +116,7 @@ impl Wall {
         if part > 0.5 { -delta } else { delta }
     }
 
-    /// How many times ∇λ of a face at the distance δ = d/h is that of a continuous wall.
+    /// ∇λ of a face at the distance δ = d/h, as a multiple of that of a continuous wall.
     pub fn strength(&self, delta: f64) -> f64 {
         let slope = self.kernel.slope(delta);
         if self.layer.is_none() || slope <= 0.0 { 1.0 } else { self.of_face(delta, 0.0).area / slope }
@@ -208,7 +208,7 @@ impl Wall {
         let beyond = of_face.part - self.at_rest;
         // on the face the bend has ended, however wide the kernel is
         let bend = BEND.min(0.25 * (ON_FACE - self.at_rest));
-        // behind the face the wall is no mirror any more: deep in it B is one, as λ is
+        // behind the face the wall is no longer a mirror: deep in it B is one, as λ is
         let (on_face, deep) = (ON_FACE - self.at_rest - bend, 1.0 - self.lattice_over_layers);
         let (more, slope) = match () {
             () if of_face.part > ON_FACE => {

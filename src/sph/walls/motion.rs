@@ -1,8 +1,8 @@
 //! How long a step may be beside bodies that move: their surfaces must not pass the fluid by, and a body that
 //! swings must be seen to swing, also where the fluid itself is still.
 //!
-//! Bodies that move without deformation say where they will be. Of other bodies nothing is known in advance; the
-//! fluid that they push limits the steps then.
+//! Bodies that move without deformation say where they will be. For other bodies nothing is known in advance;
+//! there the fluid that they push limits the steps.
 
 use glam::DVec3;
 use rayon::prelude::*;
@@ -18,17 +18,17 @@ use super::boundary::{Boundary, MARKED, box_around};
 /// Parts of a step after which a body's place is looked at.
 const PARTS: usize = 4;
 
-/// Most attempts at a step. Each is shorter than the one before.
+/// Maximum number of attempts at a step. Each is shorter than the one before.
 const ATTEMPTS: usize = 30;
 
-/// Part of the attempt before that an attempt at a step is at least.
+/// Smallest ratio of an attempt at a step to the attempt before it.
 const SHORTER: f64 = 0.25;
 
-/// Part of a usual step below which none is made shorter for a body: what still moves too far jumps, however short the
-/// step (`floor(t)`), and is passed in one step of the usual length.
+/// Least length of a step beside a body, as a part of a usual step. A body that still moves too far jumps,
+/// however short the step is (`floor(t)`), and its jump takes one step of the usual length.
 const JUMP: f64 = 1e-3;
 
-/// What a step may be beside bodies.
+/// Limits of a step beside bodies.
 pub(in crate::sph) struct StepLimits<A> {
     /// How far a body may move in a step, m.
     pub travel: f64,

@@ -1,25 +1,27 @@
-//! What walls take of a kernel in sums over a fluid's lattice, where only integrals over the walls are known and not their
-//! faces.
+//! What walls take of a kernel in sums over a fluid's lattice, where only integrals over the walls are known
+//! and not their faces.
 //!
-//! For a body that is known by its volume, λ says how much of a kernel it takes, and T = ∮ W·y·n over its surface, which is
-//! tr K − 3λ, tells by how many faces. A plane at the distance δ has T = δ·A(δ). The edge of a vessel with the same λ lies farther
-//! away, along two normals, and has more: T = Σ δ_i·A_i·(1 − λ_j) for two planes at a right angle, and so on for the three of
-//! a corner. What bodies take is therefore placed between a plane, two equal planes and three equal ones by its T.
-//! (As planes, edges of a vessel that is turned in its box would be 19 % of the rest density too dense where a fluid at rest
-//! touches both walls, corners 36 %. Water stood 3 % too high in a vessel ten spacings wide, and a full vessel held 5 % less.
-//! With two planes at unlike distances the barrier is off by 1 % of the rest density, 5 % where one is within a tenth of
-//! the support radius.)
+//! For a body that is known by its volume, λ says how much of a kernel it takes, and T = ∮ W·y·n over its
+//! surface, which is tr K − 3λ, says by how many faces. A plane at the distance δ has T = δ·A(δ). An edge of
+//! a vessel with the same λ is farther away, along two normals, and has a larger T: T = Σ δ_i·A_i·(1 − λ_j)
+//! for two planes at a right angle, and so on for the three of a corner. Therefore T decides where a body is
+//! placed between one plane, two equal planes and three equal planes. (As planes, edges of a vessel that is
+//! turned in its box would be 19 % of the rest density too dense where a fluid at rest touches both walls,
+//! corners 36 %. Water stood 3 % too high in a vessel ten spacings wide, and a full vessel held 5 % less.
+//! With two planes at unlike distances the barrier is off by 1 % of the rest density, 5 % where one is within
+//! a tenth of the support radius.)
 
 use super::layers::{OfFace, Wall};
 
-/// By so much of the way from a plane to two planes T may differ from that of a plane: it does on faces that are bent, and
-/// integrals in a map are known to some parts in a thousand.
+/// Tolerance of T for a plane, as a fraction of the way from a plane to two planes. Bent faces differ by
+/// less, and integrals in a map are known to some parts in a thousand.
 const BENT: f64 = 0.05;
 
-/// By at least so much of itself T of two planes is more than that of one with the same λ: 2^(1/6) − 1 where λ vanishes.
+/// Smallest relative excess of T of two planes over that of one plane with the same λ. It is 2^(1/6) − 1
+/// where λ vanishes.
 const LEAST_MORE: f64 = 0.12;
 
-/// What walls of which only integrals are known add to sums over a lattice.
+/// The contribution of walls of which only integrals are known to sums over a lattice.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Recess {
     /// λ: the covered part of the kernel, by layers if the wall is in layers.
@@ -30,15 +32,15 @@ pub(super) struct Recess {
     pub barrier: f64,
     /// How many times faster than λ of a continuous wall `part` grows.
     pub of_part: f64,
-    /// How many times faster than that the barrier grows, but for what changes in the parts before the other planes, which
-    /// [`Barrier`](super::coverage::Barrier) leaves out wherever walls are joined.
+    /// How many times faster than that the barrier grows, but for what changes in the parts before the other
+    /// planes, which [`Barrier`](super::coverage::Barrier) leaves out wherever walls are joined.
     pub of_barrier: f64,
-    /// What tr (K − λ·1) of layers exceeds that of a continuous wall by, if it grows as `part` does.
+    /// The excess of tr (K − λ·1) of layers over that of a continuous wall, if it grows as `part` does.
     pub of_layers: f64,
 }
 
 impl Wall {
-    /// What walls add that take the part λ of a kernel, continuous, and have this T.
+    /// The sums for walls that take the continuous part λ of a kernel and have this T.
     pub(super) fn recess(&self, part: f64, support: f64) -> Recess {
         let (plane, of_plane) = self.planes(1, part);
         if support <= of_plane * (1.0 + BENT * LEAST_MORE) {
@@ -54,7 +56,8 @@ impl Wall {
         edge.mixed(&corner, way.min(1.0))
     }
 
-    /// What a number of equal planes at right angles add that take the part λ of a kernel together, and their T.
+    /// The sums for `number` equal planes at right angles that together take the part λ of a kernel, and
+    /// their T.
     fn planes(&self, number: i32, part: f64) -> (Recess, f64) {
         // the part of the kernel before one of them, and before the others
         let before = match number {
@@ -67,7 +70,7 @@ impl Wall {
         let slope = self.kernel.slope(delta);
         let OfFace { part, area, spread, filled, barrier, barrier_area } = self.of_face(delta, 0.0);
         let others_in_layers = (1.0 - part).powi(number - 1);
-        // deep in a wall nothing grows any more
+        // deep in a wall nothing grows any further
         let in_layers = self.layer.is_some() && slope > 0.0 && others > 0.0;
         let faster = if in_layers { others_in_layers / (others * slope) } else { 0.0 };
         let of_part = if in_layers { faster * area } else { 1.0 };

@@ -1,4 +1,4 @@
-//! Which obstacle does what of all that walls do to a particle.
+//! Splits what all walls do to a particle among the obstacles.
 
 use glam::{DMat3, DVec3};
 use smallvec::SmallVec;
@@ -17,10 +17,12 @@ use crate::sph::scales::Slip;
 /// Part of a force that walls share in directions in which none of them acts.
 const BESIDE: f64 = 1e-3;
 
-/// How far behind a face, over the support radius, a place is looked at for being in its wall: less than any wall is thick.
+/// Distance behind a face, over the support radius, at which a place is tested for being in its wall: less
+/// than the thickness of any wall.
 const BEHIND: f64 = 0.02;
 
-/// How much less than 1 the cosine of the angle between two faces is that count as parallel: some ten degrees.
+/// Two faces count as parallel if the cosine of the angle between them is less than 1 by at most this: some
+/// ten degrees.
 const PARALLEL: f64 = 0.015;
 
 /// What all walls together do to a particle.
@@ -84,7 +86,8 @@ struct Facing {
 }
 
 impl Facing {
-    /// Adds to what its wall takes, so many times, what it would take of the kernel of a particle at a distance, m.
+    /// Adds to what its wall takes, `times` times, what it would take of the kernel of a particle at a
+    /// distance, m.
     fn press(&self, wall: &Wall, distance: f64, times: f64, near: &mut Near) {
         let behind =
             |distance: f64| Seen::of(&Coverage::<(), ()>::of_face(wall, &Face { distance, ..self.face }));
@@ -94,19 +97,20 @@ impl Facing {
 }
 
 impl Boundary {
-    /// Divides what walls do to a particle among the obstacles near it, and tells the share of each.
+    /// Divides what walls do to a particle among the obstacles near it, and returns the share of each.
     ///
-    /// Each wall presses as if it were alone, with p·∇λ of its own; in a corner as [`Corner`] says. What the walls together
-    /// press less, because they overlap in a corner, acts along them: it is what the mirror image in one wall lacks behind the
-    /// other. Where none overlap, as at a ball above a floor, the rest is what the closed forms of bent faces are off, and acts
-    /// along the normals.
+    /// Each wall presses as if it were alone, with p·∇λ of its own; in a corner as [`Corner`] says. Together
+    /// the walls press less, because they overlap in a corner. The difference acts along them: it is what the
+    /// mirror image in one wall lacks behind the other. Where walls do not overlap, as at a ball above a
+    /// floor, the rest is the error of the closed forms of bent faces, and acts along the normals.
     ///
-    /// What completes pressures is divided by the walls' K. A mirror image holds up the fluid beside its wall, and is pressed
-    /// down as much at its end in the corner, so that along a wall all adds up to nothing. (Divided by the normals, the floor
-    /// of a vessel had to hold up the images too, and bore 10 % less than the water on it with ten spacings from wall to wall.)
+    /// The force that completes pressures is divided by the walls' K. A mirror image holds up the fluid
+    /// beside its wall, and is pressed down as much at its end in the corner, so that along a wall all adds
+    /// up to nothing. (Divided by the normals, the floor of a vessel had to hold up the images too, and bore
+    /// 10 % less than the water on it with ten spacings from wall to wall.)
     ///
-    /// Friction is divided among the walls to which the fluid sticks, by the directions along them. All shares, that of the
-    /// box included, add up to the whole.
+    /// Friction is divided among the walls to which the fluid sticks, by the directions along them. All
+    /// shares, that of the box included, add up to the whole.
     pub fn divide(&self, wall: &Wall, p: DVec3, pushed: &Pushed, mut tell: impl FnMut(usize, Share)) {
         let mut near = self.near(wall, p);
         if let [] | [_] = &near[..] {
@@ -138,7 +142,7 @@ impl Boundary {
         }
     }
 
-    /// What moves nearer to a place than h, m.
+    /// The moving obstacles that are nearer to a place than h, m.
     pub fn moving_near(&self, p: DVec3, h: f64) -> NearMotion {
         let place = Aabb::new(p, p);
         let is_near = |k: &usize| !self.field(*k).is_far(&place, h);
@@ -149,8 +153,9 @@ impl Boundary {
         if is_alone { NearMotion::Alone(first) } else { NearMotion::BesideOthers(first) }
     }
 
-    /// The faces near a particle, with the numbers of their walls, but for those behind another wall, which has what they
-    /// would do: a floor of the box below a slab that lies on it, or one of the faces of two walls that overlap.
+    /// The faces near a particle, with the numbers of their walls, except for those behind another wall,
+    /// which takes over their part: a floor of the box below a slab that lies on it, or one of the faces of
+    /// two walls that overlap.
     fn seen(&self, wall: &Wall, p: DVec3, near: &mut [Near]) -> Vec<Facing> {
         let of = |k: usize| self.faces_of(wall, p, &near[k]).into_iter().map(move |face| (k, face));
         let faces: Vec<(usize, Face)> = (0..near.len()).flat_map(of).collect();
@@ -201,11 +206,12 @@ impl Boundary {
         shown.map(|found| Facing { wall: found.0, face: found.1, thickness: thickness(found) }).collect()
     }
 
-    /// Lets each wall press as it does in the corners that it has with others. Whether there are any.
+    /// Lets each wall press as it does in the corners that it has with others. Returns whether there are any.
     fn press_in_corners(&self, wall: &Wall, p: DVec3, near: &mut [Near]) -> bool {
         let faces = self.seen(wall, p, near);
         let deep = BEHIND * wall.h;
-        // whether the particle presses on a face itself, and the distances of its images that do; `None` if it is in no corner
+        // whether the particle presses on a face itself, and the distances of its images that do; `None` if
+        // it is in no corner
         let mut presses: Vec<Option<(bool, SmallVec<[f64; 4]>)>> = vec![None; faces.len()];
         for (n, one) in faces.iter().enumerate() {
             for (m, other) in faces.iter().enumerate().skip(n + 1).filter(|(_, other)| other.wall != one.wall)
@@ -215,7 +221,7 @@ impl Boundary {
                 let lies_in = |k: usize, depth: [f64; 2]| self.is_in(&near[k], p + corner.edge(depth));
                 // both faces begin at the edge, and there is no gap between the walls
                 let begin = lies_in(i, [deep, -deep]) && lies_in(j, [-deep, deep]);
-                // an obstacle that ends in a wall of the box is taken to go on behind it
+                // an obstacle that ends in a wall of the box is assumed to continue behind it
                 let beside = 2.0 * FLUSH * wall.h;
                 let is_box = |k: usize| near[k].obstacle.is_none();
                 let go_on = [
@@ -230,7 +236,7 @@ impl Boundary {
                     if !go_on[on] {
                         let strength = wall.strength(facing.face.distance / wall.h);
                         near[facing.wall].add(&corner.behind_both(wall.h), strength);
-                        // a thin wall goes on as far as it is thick
+                        // a thin wall extends as far as it is thick
                         let mut behind = [one.face, other.face];
                         behind[on].distance += facing.thickness;
                         if facing.thickness < wall.h
@@ -316,8 +322,8 @@ impl Boundary {
         found
     }
 
-    /// The faces of an obstacle near a particle. Where it ends behind one of them within the support radius, as a thin plate
-    /// does, the face in which it ends is told with it.
+    /// The faces of an obstacle near a particle. Where it ends behind one of them within the support radius,
+    /// as a thin plate does, the face in which it ends is listed with it.
     fn faces_before(&self, wall: &Wall, p: DVec3, k: usize) -> Faces {
         let mut told = Faces::new();
         self.field(k).faces(p, wall.h, &mut told);
@@ -334,8 +340,8 @@ impl Boundary {
         faces
     }
 
-    /// The face in which an obstacle ends behind another one that is before a particle; `None` if that is not within the
-    /// support radius.
+    /// The face in which an obstacle ends behind another one that is before a particle; `None` if that is not
+    /// within the support radius.
     fn back_of(&self, wall: &Wall, p: DVec3, front: &Face, k: usize) -> Option<Face> {
         if front.distance < -BEHIND * wall.h || front.distance >= wall.h {
             return None;
@@ -373,7 +379,7 @@ fn solved(a: DMat3, b: DVec3) -> DVec3 {
 }
 
 impl Near {
-    /// Adds a part of a wall so many times.
+    /// Adds a part of a wall the given number of times.
     fn add(&mut self, seen: &Seen, times: f64) {
         self.gradient += times * seen.gradient;
         self.moment += times * seen.moment;
@@ -477,7 +483,8 @@ mod tests {
         assert!((shares.x - 4.0 * thin).abs() < 0.02 * thin, "{shares} {thin}");
     }
 
-    /// A slab on the floor of the box, and the same once more: of walls behind one another the first has all.
+    /// A slab on the floor of the box, and a second one at the same place: of walls behind one another the
+    /// first takes everything.
     #[test]
     fn what_is_behind_another_wall_has_nothing() {
         let slab = || Closures { omega: |p: DVec3| 0.1 - p.z, gradient: |_: DVec3| -DVec3::Z };

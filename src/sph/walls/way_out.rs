@@ -1,10 +1,11 @@
 //! The way out for particles over which walls have moved.
 //!
-//! A particle that a moving wall meets on its path is put before it. But a path ends at the latest after a few
-//! contacts, and then a wall that moves on may reach the place where the particle stopped, or press it into
-//! another wall. So at the end of a step all obstacles are looked at together: the particle goes to a place
-//! near it that is outside all of them, without passing one on the way. If there is none, fluid has
-//! nowhere to go, and the run ends: a particle that stays inside would be wrong without a word.
+//! A particle that a moving wall meets on its path is put before it. But a path ends after at most a few
+//! contacts, and then a wall that keeps moving may reach the place where the particle stopped, or press it
+//! into another wall. So at the end of a step all obstacles are looked at together: the particle goes to a
+//! place near it that is outside all of them, without passing one on the way. If there is none, the fluid has
+//! nowhere to go, and the run ends, because a particle that stays inside would be an error that nobody
+//! notices.
 
 use glam::DVec3;
 
@@ -16,10 +17,11 @@ use super::{
     flight::End,
 };
 
-/// Most walls that push a particle on, one after the other.
+/// Maximum number of walls that push a particle on, one after the other.
 const ROUNDS: usize = 8;
 
-/// How often a way that begins on a surface is looked at from a little later on, up to half of it.
+/// Number of times that a way which begins on a surface is looked at again from a slightly later point, up to
+/// half of it.
 const LATER: i32 = 16;
 
 /// Clearances after which a way has left the surface that it begins on.
@@ -29,9 +31,9 @@ const BEGINNING: f64 = 4.0;
 const DISTANCES: i32 = 13;
 
 impl Boundary {
-    /// Moves a particle out of all obstacles at the end of a step in which it came from `from`, and gives it the velocity that
-    /// their walls leave it. `hit` is called for each of them with its number, the change of velocity, the velocity of the wall,
-    /// and the place.
+    /// Moves a particle out of all obstacles at the end of a step in which it came from `from`, and gives it
+    /// the velocity that their walls leave it. `hit` is called for each of them with its number, the change
+    /// of velocity, the velocity of the wall, and the place.
     pub(super) fn leave_moving(
         &self,
         from: DVec3,
@@ -96,8 +98,8 @@ impl Boundary {
             if contact.fraction > path.start {
                 return Ok(false);
             }
-            // a surface met within rounding errors may have no normal at the time of the contact: a way of some clearances
-            // shows whether it is left
+            // a surface met within rounding errors may have no normal at the time of the contact: a way of
+            // some clearances shows whether it is left
             let shortest = (BEGINNING * self.clearance / way.length()).min(0.5);
             let leaves = match contact.faces.is_empty() {
                 true => path.start < shortest && field.on_path(&path, shortest) < 0.0,

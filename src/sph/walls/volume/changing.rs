@@ -19,10 +19,10 @@ const KEYS: usize = 4;
 pub struct ChangingShape {
     /// The body.
     pub body: Arc<dyn Moving>,
-    /// The end of the run, s. What follows on it is looked at only if a simulation goes on beyond it.
+    /// The end of the run, s. The time after it is looked at only if a simulation goes beyond it.
     pub until: f64,
-    /// Equal intervals of the run, at least three, between which the body is looked at. Its surface should move by no more than a
-    /// eighth of the support radius in any of them.
+    /// Equal intervals of the run, at least three, between which the body is looked at. Its surface should
+    /// move by at most an eighth of the support radius in any of them.
     pub intervals: u64,
 }
 
@@ -32,9 +32,9 @@ impl ChangingShape {
         self.until / self.intervals as f64
     }
 
-    /// The instant, s, after so many intervals.
+    /// The instant, s, after the given number of intervals.
     fn instant(&self, number: u64) -> f64 {
-        // a formula need not hold a rounding error behind the end
+        // a formula need not hold even a rounding error behind the end
         if number == self.intervals { self.until } else { number as f64 * self.interval() }
     }
 }
@@ -76,15 +76,15 @@ impl Changing {
         (changing.maps.len() == KEYS).then_some(changing)
     }
 
-    /// Makes the maps around a time, s. Which these are depends on the time alone, so that a run which is resumed, with the same
-    /// end, goes on with the same ones.
+    /// Makes the maps around a time, s. They depend on the time alone, so a resumed run with the same end
+    /// continues with the same maps.
     pub fn move_to(&mut self, time: f64) {
         if time == self.time {
             return;
         }
         self.time = time;
         let interval = self.shape.interval();
-        // of times before the start, and after the end, a formula need not hold
+        // a formula need not hold for times before the start and after the end
         let mut first = ((time / interval) as u64).saturating_sub(1);
         if time <= self.shape.until {
             first = first.min((self.shape.intervals + 1).saturating_sub(KEYS as u64));

@@ -14,7 +14,7 @@ use crate::{
 /// Cells along the side of a tile.
 pub(super) const TILE: usize = 8;
 
-/// How far from the walls of the box, in cells, places are looked at that lie on them.
+/// Distance from the walls of the box, in cells, of the places that stand for places on the walls.
 const BESIDE_WALL: f64 = 1e-3;
 
 /// How far a cell is filled, and with what.
@@ -24,8 +24,8 @@ pub(super) struct Filled {
     pub part: f32,
     /// That part times the way from the cell's middle to its own, m.
     pub moment: [f32; 3],
-    /// The mean over the cell of (z − c)⊗(z − c) where it is filled, less what a whole cell has in proportion, m²: xx, yy,
-    /// zz, yz, zx, xy.
+    /// The mean over the cell of (z − c)⊗(z − c) where it is filled, less what a whole cell has in
+    /// proportion, m²: xx, yy, zz, yz, zx, xy.
     pub square: [f32; 6],
 }
 
@@ -51,7 +51,7 @@ impl Tile {
     }
 }
 
-/// The tiles of several bodies, of which it does not matter which is where.
+/// The tiles of several bodies together.
 pub(super) struct Fractions {
     bodies: Vec<Arc<dyn Walls>>,
     tiles: Sparse<Tile>,
@@ -110,8 +110,8 @@ impl Fractions {
         cells[at[0] + TILE * (at[1] + TILE * at[2])] = filled;
     }
 
-    /// What is filled of a cell whose range is not of one sign: of its eight parts one by one, for curved surfaces and
-    /// thin parts.
+    /// The filled part of a cell whose range is not of one sign. Its eight parts are treated one by one,
+    /// because of curved surfaces and thin parts.
     fn part(&self, lattice: &Lattice, within: &Aabb, range: Interval) -> Part {
         // a body that ends in a wall of the box has no surface there
         let margin = BESIDE_WALL * lattice.step;

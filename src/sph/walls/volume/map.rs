@@ -66,7 +66,8 @@ pub(super) struct Brick {
 }
 
 impl Brick {
-    /// The sum of bricks with weights, and with other weights the rate at which its λ changes. `None` if there are none.
+    /// The sum of bricks with weights, and with other weights the rate at which its λ changes. `None` if
+    /// there are none.
     pub fn sum<'a>(terms: impl Iterator<Item = (Option<&'a Brick>, f64, f64)>) -> Option<Box<Self>> {
         let mut sum = None;
         for (brick, weight, rate) in terms {
@@ -95,7 +96,7 @@ struct Node {
 /// A brick without bodies near.
 const NOTHING: Brick = Brick { nodes: [Node { diagonal: Vec4::ZERO, others: Vec4::ZERO }; NODES] };
 
-/// The nodes of a lattice, of which bricks are made when they are asked for.
+/// The nodes of a lattice, in bricks that are made on demand.
 pub(super) struct Spline {
     lattice: Arc<Lattice>,
     /// `None` where no body is near.

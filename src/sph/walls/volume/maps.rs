@@ -34,7 +34,7 @@ pub(in crate::sph) struct Mapped<'a> {
     pub motion: Option<&'a Arc<dyn Moving>>,
     /// The parts that move differently, if there are any.
     pub parts: &'a [RigidPart],
-    /// How it changes its shape, if it does and that is known.
+    /// How it changes its shape; `None` if it does not, or if that is not known.
     pub changing: Option<&'a ChangingShape>,
 }
 
@@ -110,7 +110,7 @@ pub(in crate::sph) enum Known {
     Parts(Vec<(Taken, DVec3)>),
     /// It is not near.
     Nothing,
-    /// Only its faces tell.
+    /// Only its faces are known.
     ByFaces,
 }
 

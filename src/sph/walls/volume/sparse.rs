@@ -1,4 +1,4 @@
-//! A three-dimensional array of which only the entries that are asked for are made.
+//! A three-dimensional array whose entries are made on demand.
 //!
 //! It is a tree with three levels of 16³ branches. An entry is made by the first thread that asks for it; others that
 //! ask meanwhile wait. What is made depends on its place alone, so the order does not matter.
@@ -32,7 +32,7 @@ impl<T> Sparse<T> {
         Some(Self { roots: empty(roots).into_vec(), counts })
     }
 
-    /// The entry with these indices, made if it is asked for the first time.
+    /// The entry with these indices, which is made at the first request.
     #[inline]
     pub fn get(&self, at: [usize; 3], make: impl FnOnce() -> T) -> &T {
         let [i, j, k] = at.map(|n| n >> (2 * BITS));

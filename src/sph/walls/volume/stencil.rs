@@ -1,8 +1,8 @@
 //! What a cell of the lattice adds to the nodes around it.
 //!
-//! The values of a map are a cubic B-spline, c ↦ Σ c_k B(x − k). With c = f − Δ²f/6 + Δ⁴f/36 along each axis, where Δ² is
-//! the second difference, it has the values f at the nodes but for Δ⁶f/216. Since f is a sum over cells, the differences
-//! are taken of what each cell adds.
+//! The values of a map are a cubic B-spline, c ↦ Σ c_k B(x − k). With c = f − Δ²f/6 + Δ⁴f/36 along each axis,
+//! where Δ² is the second difference, it has the values f at the nodes, up to Δ⁶f/216. Since f is a sum over
+//! cells, the differences are taken of what each cell adds.
 
 use std::ops::Range;
 
@@ -30,8 +30,8 @@ type Lanes = [Vec4; 2];
 struct Weight {
     /// λ, then K: xx, yy, zz, yz, zx, xy; last the derivative of λ by the z of what fills the cell, 1/m.
     sums: Lanes,
-    /// Half of the second derivatives of λ by that place, 1/m², twice for those beside the diagonal: xx, yy, zz, yz, zx,
-    /// xy; then its derivatives by x and y, 1/m.
+    /// Half of the second derivatives of λ by that place, 1/m², twice for those beside the diagonal: xx, yy,
+    /// zz, yz, zx, xy; then its derivatives by x and y, 1/m.
     bends: Lanes,
 }
 
@@ -118,8 +118,8 @@ impl Stencil {
         &self.lines
     }
 
-    /// Adds what a row of cells adds to nodes one after another along x. The first node sees the cells from the first of the
-    /// row on.
+    /// Adds what a row of cells adds to nodes one after another along x. The first node sees the cells from
+    /// the first of the row on.
     #[inline]
     pub fn add(&self, line: &Line, row: &Row, nodes: &mut [Added]) {
         let at = line.at[0] + SIDE * line.at[1];
@@ -219,8 +219,8 @@ fn sharpen(raw: &mut [[f64; TERMS]], stride: usize) {
     }
 }
 
-/// The integrals of W, of y ⊗ ∇W (as in [`super::map::Taken`]) and of the derivatives of W over a cell whose middle lies at
-/// `from` the node, by Gauss' rule with three points along each axis.
+/// The integrals of W, of y ⊗ ∇W (as in [`super::map::Taken`]) and of the derivatives of W over a cell whose
+/// middle lies at `from` the node, by Gauss' rule with three points along each axis.
 fn averaged(from: DVec3, step: DVec3, h: f64) -> [f64; TERMS] {
     const POINTS: [(f64, f64); 3] =
         [(-0.387_298_334_620_741_7, 5.0 / 18.0), (0.0, 8.0 / 18.0), (0.387_298_334_620_741_7, 5.0 / 18.0)];

@@ -133,7 +133,7 @@ fn what_is_far_or_outside_the_box_takes_nothing() {
     assert!(ball.at(DVec3::new(0.2 + 1.5 * H, 0.0, 0.0)).is_none_or(|taken| taken.part < 1e-9));
 }
 
-/// At the end of the support λ is small enough that nobody notices whether it counts.
+/// At the end of the support λ is so small that it makes no difference whether it counts.
 #[test]
 fn nothing_is_left_beyond_the_support() {
     let map = map(half_space(DVec3::ZERO, DVec3::new(0.6, 0.0, 0.8)), cube(2.0));
@@ -228,8 +228,8 @@ fn parts_of_a_body_take_their_maps_along() {
     }
 }
 
-/// A ball that grows takes what it would at each instant, and its sweep is how fast that grows: at the first and the last
-/// instant of a run too, and beyond.
+/// A ball that grows takes what it would at each instant, and its sweep is how fast that grows: at the first
+/// and the last instant of a run too, and beyond.
 #[test]
 fn bodies_that_change_their_shape_take_what_they_would_at_each_instant() {
     let program = crate::Program::from_source("grows.rfm", "rfm 1\nsolid s = sphere(0.3 + 0.2*sin(t))");
