@@ -18,8 +18,9 @@ const PATH_RESOLUTION: f64 = 0.05;
 /// Length of the window of time for which the map of a moving solid holds, in steps.
 const WINDOW: f64 = 16.0;
 
-/// How far the surface of a solid that changes its shape moves between two looks at it, over the support radius. What it
-/// takes of kernels is a cubic in time, whose error is about a thousandth then.
+/// How far, over the support radius, the surface of a solid that changes its shape moves between two looks at
+/// it. The part of kernels that it takes is interpolated by a cubic in time, whose error is then about a
+/// thousandth.
 const CHANGE: f64 = 1.0 / 8.0;
 
 /// The least number of intervals between such looks in a run.
@@ -31,7 +32,7 @@ pub struct Body {
     pub solid: Solid,
     /// What the scene states about the solid's surface.
     pub skin: Skin,
-    /// The solid in the form that the simulation uses.
+    /// The solid as the simulation uses it.
     pub(super) obstacle: Obstacle,
 }
 
@@ -66,7 +67,7 @@ pub(super) fn greatest_speed(program: &Program, scene: &Scene, parts: &[Part<'_>
     parts.iter().map(speed).fold(0.0, f64::max)
 }
 
-/// The parts as what a simulation needs.
+/// The parts in the form that a simulation needs.
 pub(super) fn of_parts(
     program: &Program,
     scene: &Scene,
@@ -106,8 +107,8 @@ fn body(
     Ok(Body { solid, skin, obstacle })
 }
 
-/// How often a solid that changes its shape during a run is looked at; `None` if it does not change it, if it has so many
-/// parts that its volume would cost too much, or if its surface is not found.
+/// How often a solid that changes its shape during a run is looked at; `None` if it does not change it, if it
+/// has too many parts for its volume to be affordable, or if its surface is not found.
 fn changing_shape(
     program: &Program,
     shape: Node,

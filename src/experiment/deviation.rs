@@ -1,8 +1,8 @@
 //! How far a simulated flow is from the solution that its scene states in the block `truth`.
 //!
 //! Each deviation is relative, in the L2 norm over the particles and all sampled instants together: √(Σ (a −
-//! a*)² / Σ a*²). At an instant at which the known value vanishes, such as a wave that turns, the denominator
-//! gains nothing, and the numerator as much as at any other instant.
+//! a*)² / Σ a*²). Where the known value vanishes, as when a wave turns, that instant adds nothing to the
+//! denominator, and as much as any other to the numerator.
 
 use super::Experiment;
 use crate::ir::{Given, Interpreter, Node};

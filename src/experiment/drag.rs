@@ -8,8 +8,8 @@ use crate::geom::{Aabb, Placement};
 use crate::lower::{AskedMean, Measured, Probe, Scene};
 use crate::sph::{Gradients, Method, Parameters};
 
-/// How far a body that counts as one at rest moves while its mean force is taken, over the support radius: less than is seen of
-/// its surface. What comes to rest slowly never stops for good.
+/// A body counts as at rest if it moves less than this part of the support radius while its mean force is
+/// taken: less than is seen of its surface. A body that comes to rest slowly never stops completely.
 const STILL: f64 = 1e-3;
 
 /// Instants at which a body is looked at while its mean force is taken.
@@ -17,12 +17,12 @@ const INSTANTS: usize = 61;
 
 /// A warning for each mean of the force on a body that moves meanwhile, with a method that makes its drag too large.
 ///
-/// Bodies that have come to rest are told of no more than those at rest from the start. A vessel is not told of either: what
-/// acts on the fluid besides its weight are the walls of the vessel alone, so that the mean force on them is the fluid's
-/// weight and the change of its momentum over the time, however much the fluid resists being sheared. (In vessels of six to
-/// twenty spacings that were thrown sideways or upwards it was right to 0.1 %. Where a wall of the box is its floor or lid, that wall
-/// bears a share of its own.) An obstacle in it would share that force, and the
-/// torque on a vessel that turns is what the fluid resists.
+/// Bodies at rest, from the start or by now, get no warning. Neither does a vessel: besides its weight, only
+/// the walls of the vessel act on the fluid, so the mean force on them is the fluid's weight and the change
+/// of its momentum over the time, however much the fluid resists being sheared. (In vessels of six to twenty
+/// spacings that were thrown sideways or upwards it was right to 0.1 %. Where a wall of the box is its floor
+/// or lid, that wall bears a share of its own.) An obstacle in it would share that force, and the torque on a
+/// vessel that turns is what the fluid resists.
 pub(super) fn warnings(scene: &Scene, parameters: &Parameters, bodies: &[Body]) -> Vec<Diagnostic> {
     if parameters.viscosity >= parameters.rest_density * parameters.numerical_viscosity() {
         return Vec::new();
@@ -30,7 +30,7 @@ pub(super) fn warnings(scene: &Scene, parameters: &Parameters, bodies: &[Body]) 
     let in_pairs = match scene.method {
         Method::Wcsph(numbers) => numbers.gradients == Gradients::Pairs,
         Method::Dfsph(_) => true,
-        // its fluid is as thick as the paper's, and gives more drag than that anyway
+        // its fluid is as viscous as the paper's, and that causes more drag than the method does
         Method::Paper(_) => false,
     };
     let told = |probe: &Probe| {
@@ -77,7 +77,8 @@ impl Window {
         self.instants().map(|time| moving.placement(time)).collect()
     }
 
-    /// Whether no place of a body in a box moves by more than `way`, m. What is not known to be at rest moves.
+    /// Whether no place of a body in a box moves by more than `way`, m. A body that is not known to be at
+    /// rest counts as moving.
     fn is_at_rest(self, body: &Body, moving: &dyn Moving, domain: &Aabb, way: f64) -> bool {
         let parts = &body.obstacle.parts;
         if !parts.is_empty() {
@@ -87,7 +88,7 @@ impl Window {
         if let Some(places) = self.placements(moving) {
             return stays(Some(places), domain, way);
         }
-        // of many parts the gradient would be one large program, which nothing else needs
+        // for many parts, the gradient would be one large program, which nothing else needs
         !body.solid.has_many_leaves()
             && self.instants().all(|time| {
                 wall_speed::moved(&body.solid, domain, [self.from, time]).is_some_and(|moved| moved <= way)
@@ -111,7 +112,8 @@ mod tests {
     use super::*;
     use crate::{Engine, Experiment, Program};
 
-    /// Whether a scene with a body, and with a probe of its mean force over the second half of two seconds, is warned of.
+    /// Whether there is a warning for a scene with a body, and with a probe of its mean force over the second
+    /// half of two seconds.
     #[track_caller]
     fn is_told(body: &str, solid: &str, more: &str) -> bool {
         let text = format!(

@@ -1,8 +1,9 @@
-//! Where the fluid tapers off between walls and no particle finds room, so that nothing presses on them.
+//! Wedges between walls in which no particle finds room, so that nothing presses on the walls.
 //!
-//! A particle keeps half a spacing from walls, so the wedge below a cylinder that lies on a floor stays empty over √(2Rs) of
-//! its way. The load that is missing there is found from points on the surface: those in the fluid's shape that have no
-//! particle near, each weighed by its depth. Scenes so large that there are too many points are not looked at.
+//! A particle keeps half a spacing from walls, so the wedge below a cylinder that lies on a floor stays empty
+//! over √(2Rs) of its way. The load that is missing there is found from points on the surface: those in the
+//! fluid's shape that have no particle near, each weighted by its depth. Scenes so large that there are too
+//! many points are not looked at.
 
 use glam::DVec3;
 use rustc_hash::FxHashMap;
@@ -14,11 +15,11 @@ use crate::geom::Aabb;
 use crate::lower::Gravity;
 use crate::sph::Particles;
 
-/// A point has a particle near if that is not farther, in spacings. On plain walls a lattice that does not fit them leaves
-/// 1.5 spacings, and in their corners 1.7.
+/// A point has a particle near if one is within this distance, in spacings. On plain walls a lattice that
+/// does not fit them leaves 1.5 spacings, and in their corners 1.7.
 const NEAR: f64 = 2.0;
 
-/// The part of a load that is told of when it is missing.
+/// Missing loads above this part get a warning.
 const MUCH: f64 = 0.02;
 
 /// Distances between points, in spacings: the first for which there are not too many.
@@ -76,7 +77,8 @@ impl Experiment {
         })
     }
 
-    /// Visits points of a lattice that lie in the fluid's shape and outside all bodies, next to one that lies in `body`.
+    /// Visits points of a lattice that lie in the fluid's shape and outside all bodies, next to one that lies
+    /// in `body`.
     fn visit_wetted(&self, body: &Body, mut visit: impl FnMut(DVec3)) {
         let spacing = self.parameters.spacing();
         let Some(shape) = self.fluid.bounds().aabb() else { return };
@@ -123,7 +125,7 @@ impl Experiment {
         }
     }
 
-    /// What the points of a plane of the lattice are. `others` are the other bodies in the lattice's box.
+    /// Classifies the points of a plane of the lattice. `others` are the other bodies in the lattice's box.
     fn plane(&self, body: &Body, others: &[&Body], lattice: &Lattice, k: usize) -> Plane {
         let [x, y, z] = lattice.plane(k);
         let mut sign = vec![0.0; x.len()];
@@ -200,7 +202,7 @@ impl<'a> Near<'a> {
     }
 }
 
-/// A place with digits that tell tenths of the spacing apart.
+/// A place with digits fine enough to show tenths of the spacing.
 fn place(at: DVec3, spacing: f64) -> String {
     let digits = (1.0 - spacing.log10()).ceil().clamp(0.0, 9.0) as usize;
     let unit = 10_f64.powi(digits as i32);

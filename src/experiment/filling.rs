@@ -1,17 +1,17 @@
-//! How particles fill the shape of a fluid so that they weigh what it does.
+//! Fills the shape of a fluid with particles so that they have its mass.
 //!
 //! A lattice seldom divides a shape. Its cells are therefore fitted: in a box that the fluid fills they are
-//! stretched along each axis so that whole layers reach from face to face, and where a number of particles is stated,
-//! some rows hold one more than the others ([`Rows`]). Elsewhere they are stretched to fit several levels ([`Chords`]), or
-//! their size is varied until their number times their volume is that of the fluid, or as many sites are taken as are
-//! stated, the deepest. What is left of the difference goes into the mass of the particles: m = ρ₀·V/N, with the volume V of the
-//! shape in the box and outside all bodies.
+//! stretched along each axis so that whole layers reach from face to face, and where a number of particles is
+//! stated, some rows hold one more than the others ([`Rows`]). Elsewhere they are stretched to fit several
+//! levels ([`Chords`]), or their size is varied until their number times their volume is that of the fluid,
+//! or the stated number of sites is taken, the deepest. What is left of the difference goes into the mass of
+//! the particles: m = ρ₀·V/N, with the volume V of the shape in the box and outside all bodies.
 //!
 //! A fluid without a surface that must not be compressed is packed once it is placed, and loses some of its mass: see
 //! [`Parameters::fills_vessel`](crate::sph::Parameters::fills_vessel).
 //!
-//! A scene that states how many particles there are and how large each is has no such freedom. It is filled as it
-//! says, from below or from the middle.
+//! A scene that states both the number of particles and their size has no such freedom. It is filled from
+//! below or from the middle, as it states.
 
 use glam::DVec3;
 use smallvec::SmallVec;
@@ -36,23 +36,25 @@ const CLEARANCE: f64 = 0.5;
 /// Difference between the volume of a fluid and that of its cells at which the search for a spacing ends.
 const GOOD_ENOUGH: f64 = 1e-3;
 
-/// Difference between the masses of a particle that is not told from the error of the volume.
+/// Masses of a particle that differ by less than this part cannot be distinguished from errors of the volume.
 const SAME: f64 = 3e-4;
 
-/// Room of a scene over the volume of its fluid, from which on the fluid has a surface.
+/// If the room of a scene is at least this many times the volume of its fluid, the fluid has a surface.
 const LEAST_ROOM: f64 = 1.03;
 
-/// Lattices that are tried for one shape, at most.
+/// Maximum number of lattices that are tried for one shape.
 const TRIALS: usize = 8;
 
-/// Part of a fluid that must come to its place by cells that are longer than wide, or cubes serve as well.
+/// Stretched cells are used only if they put at least this part of the fluid into a better place than cubes
+/// do.
 const WORTH_STRETCHING: f64 = 0.01;
 
-/// Part of a lattice's sites from which on the search for a better lattice goes on, where a number of particles is
-/// stated and the others stay vacant.
+/// Where a number of particles is stated and the other sites stay vacant: the search for a better lattice
+/// goes on if at least this part of the sites is vacant.
 const MANY_VACANCIES: f64 = 0.02;
 
-/// Change of a particle's mass or of the spacing that is not made, because it is no rounding of a lattice any more.
+/// Largest change of a particle's mass or of the spacing that counts as rounding of the lattice. Larger
+/// changes are not made.
 const TOO_FAR: f64 = 0.1;
 
 /// A fluid at the start.
@@ -75,7 +77,7 @@ enum Sites {
     Stated,
     /// On a lattice with cells of this size, m.
     Cells(DVec3),
-    /// As many as are wanted of a lattice with cells of this size, m, where the shape is deepest.
+    /// The wanted number of sites of a lattice with cells of this size, m, taken where the shape is deepest.
     Deepest(DVec3, usize),
     /// In rows that fill a box.
     Rows(Rows),
@@ -142,10 +144,10 @@ impl Experiment {
         Ok(Filling { particles, carved, mass, volume: Some(volume), fills_vessel })
     }
 
-    /// Places particles on the lattice that fits the fluid's volume best, m³, in a shape of which bodies take another
-    /// volume.
+    /// Places particles on the lattice that best fits the fluid's volume, m³. Bodies take the volume `taken`
+    /// of the shape.
     fn fit(&self, obstacles: &[Obstacle], within: Aabb, volume: f64, taken: f64) -> Result<Placed, Error> {
-        // a hair smaller than the box, whose faces have ω = 0
+        // slightly smaller than the box, whose faces have ω = 0
         let is_box = self.fluid.range(&within.grown(-1e-6 * within.size().min_element())).lo > 0.0;
         let best = if is_box { self.fit_box(obstacles, within, volume, taken)? } else { None };
         match (best, self.scene.fluid.particles) {
@@ -155,8 +157,9 @@ impl Experiment {
         }
     }
 
-    /// A lattice of whole layers along each side of a box, of which bodies take a part, or rows where a number of particles is
-    /// stated, with the part of its sites that stays vacant. `None` if none holds that number.
+    /// A lattice of whole layers along each side of a box, of which bodies take a part, or rows where a
+    /// number of particles is stated, with the part of its sites that stays vacant. `None` if none holds that
+    /// number.
     fn fit_box(
         &self,
         obstacles: &[Obstacle],
@@ -187,8 +190,8 @@ impl Experiment {
         Ok(best)
     }
 
-    /// The lattice whose cells times their number come nearest to the volume of a shape of any kind, m³, of which bodies take
-    /// another volume.
+    /// The lattice whose cells times their number come nearest to the volume of a shape of any kind, m³, of
+    /// which bodies take another volume.
     fn fit_shape(
         &self,
         obstacles: &[Obstacle],
@@ -210,7 +213,7 @@ impl Experiment {
             if off.abs() < GOOD_ENOUGH || free == 0.0 {
                 break;
             }
-            // a sheet thinner than the spacing weighs what it does by the mass of its particles
+            // a sheet thinner than the spacing gets its weight from the mass of its particles
             size = (size * (-off / free).exp()).clamp((1.0 - TOO_FAR) * spacing, (1.0 + TOO_FAR) * spacing);
         }
         let (off, placed) = best.ok_or_else(|| self.no_lattice())?;
@@ -236,8 +239,8 @@ impl Experiment {
         Ok(if gained > WORTH_STRETCHING { (particles, carved, cell) } else { placed })
     }
 
-    /// Places a number of particles, each as large as a cell, in a shape of any kind, or takes what is known with its error
-    /// if nothing fits better.
+    /// Places a number of particles, each as large as a cell, in a shape of any kind. If nothing fits better,
+    /// it keeps the lattice that is already known, with its error.
     fn fit_number(
         &self,
         obstacles: &[Obstacle],
@@ -253,8 +256,8 @@ impl Experiment {
             let sites = Sites::Deepest(cell, number);
             let (particles, carved) = self.place(obstacles, sites, None, Some(taken))?;
             let ratio = particles.len() as f64 / wanted as f64;
-            // too few leave the number unmet; of too many some are left out, and cells that differ from the room of a
-            // particle crowd it
+            // with too few sites the number is not met; with too many some are left out, and cells that
+            // differ from the room of a particle crowd it
             let off = (wanted as f64 * cell.element_product() / volume).ln().abs();
             let error = if ratio < 1.0 { f64::INFINITY } else { ratio.ln() + off };
             if best.as_ref().is_none_or(|(least, _)| error < *least) {
@@ -308,7 +311,7 @@ impl Experiment {
         let layers: [Layers; 3] = std::array::from_fn(|axis| self.layers(within, axis, cell[axis]));
         let min = DVec3::from_array(layers.map(|layers| layers.start));
         let number = DVec3::from_array(layers.map(|layers| layers.number));
-        // a hair more room, so that rounding does not take a layer
+        // slightly more room, so that rounding does not take a layer
         Aabb::new(min, min + number * cell * (1.0 + 1e-12))
     }
 
@@ -340,8 +343,8 @@ impl Experiment {
         bounds
     }
 
-    /// Places particles at rest, and removes those that obstacles leave no room for: as many as the volume, m³, has cells
-    /// that they take of the shape, if it is known.
+    /// Places particles at rest, and removes those for which obstacles leave no room. If the volume of the
+    /// shape that obstacles take, m³, is known, the number removed is the number of cells in that volume.
     fn place(
         &self,
         obstacles: &[Obstacle],
@@ -396,7 +399,8 @@ impl Experiment {
         Ok((particles, carved))
     }
 
-    /// A warning if the fluid has become lighter than it was placed, from the mass, kg, of its particles now.
+    /// A warning if the fluid has become lighter than it was placed; it is given the present mass, kg, of a
+    /// particle.
     pub(super) fn lightening(&self, filling: &Filling, mass: f64) -> Option<Diagnostic> {
         let part = 1.0 - mass / filling.mass;
         (part > GOOD_ENOUGH).then(|| {
@@ -443,8 +447,8 @@ impl Experiment {
     }
 }
 
-/// So many of the particles, evenly chosen: the others leave vacancies that the fluid closes at once. (If a top layer were
-/// left out instead, all the rest would be compressed by what it weighs.)
+/// Keeps the wanted number of particles, spread evenly. The others leave vacancies, which the fluid closes at
+/// once. (If a top layer were left out instead, all the rest would be compressed by what it weighs.)
 fn thinned(particles: &Particles, number: usize) -> Particles {
     let mut kept = Particles::default();
     let all = particles.len();

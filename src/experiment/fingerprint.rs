@@ -1,4 +1,4 @@
-//! Which state belongs to which scene.
+//! Fingerprints, which say whether a state belongs to a scene.
 
 use super::Experiment;
 use crate::ir;
@@ -6,8 +6,8 @@ use crate::sph::Parameters;
 
 impl Experiment {
     /// A fingerprint of all that determines the bits of a state: the fluid, the box, the obstacles and the
-    /// method's numbers. The length of steps, the length of the run and what it saves are not part of it, so a
-    /// run may go on from a [`Checkpoint`](crate::sph::Checkpoint) with others.
+    /// method's numbers. The length of steps, the length of the run and what it saves are not part of it, so
+    /// a run may continue from a [`Checkpoint`](crate::sph::Checkpoint) with other ones.
     pub fn fingerprint(&self) -> [u8; 32] {
         let scene = &self.scene;
         let fluid = &scene.fluid;

@@ -1,14 +1,16 @@
 //! How wide the cells of a lattice are along each axis so that whole layers of them fill a shape.
 //!
-//! The surface of a fluid often lies at several levels: that of two pools, or of a lake and a wet bed behind a gate. A
-//! lattice of cubes ends above or below each of them by up to half a layer. The whole weighs what it should, because the
-//! mass of a particle is fitted, but one pool is too full and the other too empty: with a spacing of 3 cm, 17 cm beside 50 cm
-//! would be off by +7.5 and −2.5 %. Cells that are a few per cent higher or lower than wide fit both. Obstacles are left out: what
-//! they take of a lattice is carved from it by its volume.
+//! The surface of a fluid often lies at several levels: that of two pools, or of a lake and a wet bed behind
+//! a gate. A lattice of cubes ends above or below each of them by up to half a layer. The whole weighs what
+//! it should, because the mass of a particle is fitted, but one pool is too full and the other too empty:
+//! with a spacing of 3 cm, 17 cm beside 50 cm would be off by +7.5 and −2.5 %. Cells that are a few per cent
+//! higher or lower than wide fit both. Obstacles are left out: what they take of a lattice is carved from it
+//! by its volume.
 //!
-//! Levels are found by chords: the parts of parallel lines that lie in the shape. Where neighbouring lines have the same
-//! chord, it lies between flat faces. The chords of a ball or of a slope are all different: what a lattice lacks on one line it
-//! has too much on another, so they do not ask for cells of a certain width.
+//! Levels are found by chords: the parts of parallel lines that lie in the shape. Where neighbouring lines
+//! have the same chord, it lies between flat faces. The chords of a ball or of a slope are all different:
+//! what a lattice lacks on one line it has too much of on another, so no width of cells fits them better than
+//! others.
 
 use crate::field::{Field, Points, is_inside};
 use crate::geom::Aabb;
@@ -23,8 +25,8 @@ const HALVINGS: usize = 12;
 /// Fewest and most samples along a line.
 const SAMPLE_LIMITS: [f64; 2] = [16.0, 4096.0];
 
-/// Change of a cell's width that is tried, as a part of the spacing, and the number of widths that are. That of the spacing
-/// itself, which is a mean over the axes, is no greater.
+/// Change of a cell's width that is tried, as a part of the spacing, and the number of widths that are. That
+/// of the spacing itself, which is a mean over the axes, is no greater.
 const MOST_STRETCHED: f64 = 0.1;
 const WIDTHS: usize = 81;
 
@@ -34,8 +36,8 @@ const SAME: f64 = 0.01;
 /// Neighbouring lines whose chords must be the same for these to lie between flat faces.
 const FLAT: usize = 3;
 
-/// How much worse cells are that are longer than wide by one part in their length, in parts of the fluid that lie at the wrong
-/// place.
+/// Penalty for stretched cells: the part of the fluid at a wrong place that counts as much as cells which are
+/// longer than wide by one part in their length.
 const UNEVEN: f64 = 0.05;
 
 /// The layers of a lattice along an axis.
@@ -85,8 +87,8 @@ impl Chords {
         if *whole > 0.0 { flat.iter().map(off).sum::<f64>() / whole } else { 0.0 }
     }
 
-    /// The width of cells, m, about as large as the spacing, of which layers fit the chords along an axis best. `layers` tells
-    /// where those of a width begin.
+    /// The width of cells, m, about as large as the spacing, of which layers fit the chords along an axis
+    /// best. `layers` says where the layers of a width begin.
     pub fn fitted(&self, axis: usize, spacing: f64, layers: impl Fn(f64) -> Layers) -> f64 {
         let mut best = (f64::INFINITY, spacing);
         for k in 0..WIDTHS {

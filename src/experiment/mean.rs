@@ -1,6 +1,6 @@
 //! Means over samples that depend on each other, with their errors.
 
-/// Samples are joined to so many blocks, whose means are taken to be independent.
+/// Samples are grouped into this number of blocks, whose means are taken to be independent.
 const BLOCKS: usize = 8;
 
 /// Fewest samples of a block.
@@ -11,19 +11,19 @@ const LEAST_OF_BLOCK: usize = 4;
 pub struct Mean {
     /// The mean.
     pub value: f64,
-    /// Its standard error; `None` where there are too few samples to tell.
+    /// Its standard error; `None` if there are too few samples for one.
     pub error: Option<f64>,
     /// Number of samples.
     pub samples: usize,
 }
 
 impl Mean {
-    /// The mean of samples in the order of time, each with the time, s, for which it stands; those that are not finite do not
-    /// count. `None` if none is left.
+    /// The mean of samples in the order of time, each with the time, s, for which it stands; those that are
+    /// not finite do not count. `None` if none is left.
     ///
-    /// Samples of a flow that follow each other are alike, so that σ/√n is too small an error. They are therefore joined to
-    /// eight blocks, and the error is that of the mean of their means (H. Flyvbjerg, H. G. Petersen, J. Chem. Phys. 91, 1989). It
-    /// holds if whatever swings does so within a block.
+    /// Samples of a flow that follow each other are alike, so that σ/√n is too small an error. They are
+    /// therefore joined to eight blocks, and the error is that of the mean of their means (H. Flyvbjerg, H.
+    /// G. Petersen, J. Chem. Phys. 91, 1989). This holds if every oscillation is shorter than a block.
     pub fn of(samples: impl IntoIterator<Item = (f64, f64)>) -> Option<Self> {
         let samples: Vec<(f64, f64)> =
             samples.into_iter().filter(|(value, time)| value.is_finite() && *time > 0.0).collect();

@@ -132,13 +132,13 @@ impl Experiment {
         &self.parameters
     }
 
-    /// The length of steps, and why they are as long as they are.
+    /// The length of steps, and the reason for it.
     pub fn time_step(&self) -> TimeStep {
         self.time_step
     }
 
-    /// A speed that the fluid can reach, m/s: the greater one of what its velocity at the start and a fall through the box give,
-    /// and of the speed of walls that move.
+    /// A speed that the fluid can reach, m/s: the larger of two speeds, the one from its velocity at the
+    /// start and a fall through the box, and the one of walls that move.
     pub fn typical_speed(&self) -> f64 {
         self.parameters.expected_speed
     }
@@ -148,8 +148,8 @@ impl Experiment {
         &self.bodies
     }
 
-    /// A speed that the fluid may reach, m/s, for the scale of pictures: [`Experiment::typical_speed`], or if this is 0 that of
-    /// what drives the fluid. Always positive.
+    /// A speed that the fluid may reach, m/s, for the scale of pictures: [`Experiment::typical_speed`], or if
+    /// that is 0, the speed that other causes give the fluid. Always positive.
     pub fn speed_scale(&self) -> f64 {
         match self.typical_speed() {
             speed if speed > 0.0 => speed,

@@ -5,14 +5,15 @@ use crate::field::is_flat;
 use crate::geom::Aabb;
 use crate::solid::{ProgramKind, Solid};
 
-/// Boxes that are looked at before it is left open whether an obstacle reaches into the room, and how many
-/// operations of its formula are evaluated for them: some tenths of a second.
+/// Limits of the search for an obstacle that reaches into the room: the number of boxes, and of operations of
+/// its formula that are evaluated for them. Together they take some tenths of a second.
 const MOST: (usize, usize) = (200_000, 20_000_000);
 
-/// Whether an obstacle has no place at which fluid could be if it were not there, at any time from 0 to `until`, s.
-/// What reaches into the room by less than `depth`, m, may count as nothing. `outside` is the outside of the container.
+/// Whether, at all times from 0 to `until`, s, an obstacle covers no place where fluid could be without it.
+/// An obstacle that reaches into the room by less than `depth`, m, may count as out of reach. `outside` is
+/// the outside of the container.
 ///
-/// False is said where it takes too long to tell, too, and inside a container that moves.
+/// Returns false also where the search takes too long, and inside a container that moves.
 pub fn is_out_of_reach(
     obstacle: &Solid,
     outside: Option<&Solid>,

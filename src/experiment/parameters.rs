@@ -18,7 +18,8 @@ pub struct TimeStep {
     pub reason: &'static str,
 }
 
-/// Number of times of a run at which what depends on time alone is looked at, and what depends on the place too.
+/// Number of times of a run at which quantities are looked at that depend on time alone, and number for those
+/// that depend on the place too.
 const MANY_INSTANTS: usize = 256;
 const SOME_INSTANTS: usize = 13;
 
@@ -41,7 +42,7 @@ pub(super) fn typical_speed(program: &Program, scene: &Scene) -> f64 {
 /// All parameters except the time step, which is 1 s here. `mass` is that of a particle, kg.
 pub(super) fn of_scene(program: &Program, scene: &Scene, mass: f64, typical_speed: f64) -> Parameters {
     let (fluid, method) = (&scene.fluid, scene.method.fluid());
-    // a length that is stated for the usual particles grows with those of another size
+    // a length that is stated for the usual particles scales with the size of particles
     let (stated, derived) = ((fluid.mass / fluid.density).cbrt(), (mass / fluid.density).cbrt());
     let support = scene.method.support(fluid.surface_tension > 0.0);
     let usual = support.radius(stated) * (derived / stated);
@@ -75,33 +76,35 @@ pub(super) fn of_scene(program: &Program, scene: &Scene, mass: f64, typical_spee
     }
 }
 
-/// Speed, rms, that a drop at rest keeps in a method that keeps its density, over √(σ/ρa) with the spacing a, at an Ohnesorge
-/// number µ/√(ρσa) of [`STIRRED_AT`] and with kernels of three spacings: the most that was measured, with 500 particles. With
-/// 2000 and 8000 it is 0.0023 and 0.0008 at numbers of 0.14 and 0.18 (0.05 by the radius, as with 500).
+/// Speed, rms, that a drop at rest keeps in a method that keeps its density, over √(σ/ρa) with the spacing a,
+/// at an Ohnesorge number µ/√(ρσa) of [`STIRRED_AT`] and with kernels of three spacings: the most that was
+/// measured, with 500 particles. With 2000 and 8000 it is 0.0023 and 0.0008 at numbers of 0.14 and 0.18 (0.05
+/// by the radius, as with 500).
 const STIRRED: f64 = 0.0075;
 const STIRRED_AT: f64 = 0.1;
 
-/// It grows with a smaller number as that to this power: measured are the powers 0.65 and 0.8 from 0.1 to 0.01.
+/// Exponent: the speed grows as the Ohnesorge number to the power of −0.7 (measured: 0.65 and 0.8 for numbers
+/// from 0.1 to 0.01).
 const CALMING: f64 = 0.7;
 
-/// And no farther than to this part of √(σ/ρa).
+/// Upper limit of that speed, in units of √(σ/ρa).
 const MOST_STIRRED: f64 = 0.05;
 
-/// Kernels that reach less far see normals that are rougher: with 2.2 spacings it is 1.7 times as much with 500 particles, and
-/// 3 times with 2000.
+/// Shorter kernels see rougher normals: with 2.2 spacings the speed is 1.7 times as large with 500 particles,
+/// and 3 times with 2000.
 const SMOOTH_REACH: f64 = 3.0;
 
-/// Steps of a run from which on that is told: with a thousand particles they take half a day.
+/// Runs with more steps get a warning: with a thousand particles they take half a day.
 const MANY_STEPS: f64 = 1e8;
 
-/// Part of the expected speed from which on that is told.
+/// Stirring above this part of the expected speed gets a warning.
 const MUCH_STIRRED: f64 = 0.05;
 
-/// The change of density, in per cent, from which on a slow sound is told of.
+/// Slow sound gets a warning if it lets the density change by more than this, in per cent.
 const MUCH_COMPRESSED: f64 = 5.0;
 
-/// A warning if the surface tension stirs the fluid, which it does in methods that keep the density: the force on a surface is
-/// no gradient of an energy, and nothing but viscosity takes what it gives.
+/// A warning if the surface tension stirs the fluid, which it does in methods that keep the density: the
+/// force on a surface is no gradient of an energy, and only viscosity takes the energy that it gives.
 pub(super) fn stirring(scene: &Scene, parameters: &Parameters) -> Option<Diagnostic> {
     let Parameters { surface_tension, viscosity, rest_density, expected_speed, support_radius, .. } =
         *parameters;
@@ -120,8 +123,8 @@ pub(super) fn stirring(scene: &Scene, parameters: &Parameters) -> Option<Diagnos
     })
 }
 
-/// A warning if a stated speed of sound is so low that the fluid is compressed like a gas: its density changes by the square
-/// of the speed over that of sound.
+/// A warning if a stated speed of sound is so low that the fluid is compressed like a gas: its density
+/// changes by the square of the speed over that of sound.
 pub(super) fn slow_sound(scene: &Scene, parameters: &Parameters) -> Option<Diagnostic> {
     let Method::Wcsph(numbers) = scene.method else { return None };
     let (sound, speed) = (numbers.sound_speed?, numbers.driven_speed(&parameters.scales()));
@@ -168,7 +171,7 @@ pub(super) fn time_step(scene: &Scene, parameters: &Parameters) -> (TimeStep, Op
     }
 }
 
-/// A warning if the run takes so many steps that it hardly ends.
+/// A warning if the run has too many steps to finish in reasonable time.
 pub(super) fn many_steps(scene: &Scene, parameters: &Parameters) -> Option<Diagnostic> {
     let (shortest, cause) = parameters.shortest_step(parameters.expected_speed);
     let (step, cause, at) = match scene.run.dt {
@@ -207,8 +210,8 @@ fn at_start(program: &Program, gravity: &Gravity) -> DVec3 {
     }
 }
 
-/// Times of a run, s, at which what depends on time is looked at: its start, its end, and between them such that no period of
-/// an oscillation divides.
+/// Times of a run, s, at which quantities that depend on time are looked at: its start, its end, and times
+/// between them that are no multiples of a period of an oscillation.
 fn instants(scene: &Scene, number: usize) -> impl Iterator<Item = f64> + use<'_> {
     let between = (0..number).map(move |k| (k as f64 + 0.618) / number as f64);
     between.chain([0.0, 1.0]).map(|part| part * scene.run.until)
@@ -230,8 +233,8 @@ fn most(scene: &Scene, value: impl Fn(DVec3) -> f64) -> f64 {
     (0..SIDE.pow(3)).map(|k| value(at(k))).filter(|v| v.is_finite()).fold(0.0, f64::max)
 }
 
-/// The greatest size of a vector where the fluid is at the start, at some instants of the run; at least 0. Formulas may have
-/// poles elsewhere.
+/// The greatest size of a vector where the fluid is at the start, at some instants of the run; at least 0.
+/// Formulas may have poles elsewhere.
 fn most_in_fluid(program: &Program, scene: &Scene, nodes: &[Node; 3], size: impl Fn(DVec3) -> f64) -> f64 {
     let (fluid, vector) = (vector_field(program, &[scene.fluid.shape; 3]), vector_field(program, nodes));
     let inside = |p: DVec3, time: f64| if fluid(p, 0.0).x > 0.0 { size(vector(p, time)) } else { 0.0 };
@@ -239,8 +242,9 @@ fn most_in_fluid(program: &Program, scene: &Scene, nodes: &[Node; 3], size: impl
     instants(scene, SOME_INSTANTS).map(at).fold(0.0, f64::max)
 }
 
-/// A speed that the fluid reaches where it neither falls nor moves at the start: that of its known solution, of surfaces that
-/// take it along, or of a fall through the box under a force that depends on the place. 1 m/s if nothing is known.
+/// A speed that the fluid reaches where it neither falls nor moves at the start: that of its known solution,
+/// of surfaces that take it along, or of a fall through the box under a force that depends on the place. 1
+/// m/s if nothing is known.
 pub(super) fn driven_speed(program: &Program, scene: &Scene) -> f64 {
     let fastest = |nodes: &[Node; 3]| most_in_fluid(program, scene, nodes, DVec3::length);
     let container = scene.container.iter().map(|c| c.skin);

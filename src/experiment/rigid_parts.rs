@@ -1,5 +1,5 @@
-//! The parts of an obstacle that move differently, each without deformation: gates of one solid that lift one after another,
-//! a frame with a drum that turns in it.
+//! The parts of an obstacle that move differently, each without deformation: gates of one solid that lift one
+//! after another, a frame with a drum that turns in it.
 
 use std::sync::Arc;
 
@@ -12,7 +12,7 @@ use crate::{Engine, Program};
 /// The most parts of an obstacle: each has a map of its own.
 const MOST_PARTS: usize = 16;
 
-/// Instants of a run at which is seen whether a shape is deformed.
+/// Instants of a run at which a shape is tested for deformation.
 const INSTANTS: usize = 61;
 
 /// Whether a shape moves as a whole during a run that ends at a time, s.
@@ -23,7 +23,8 @@ pub(super) fn keeps_its_shape(program: &Program, shape: Node, until: f64) -> boo
     motion.is_some_and(|motion| instants.all(|time| motion.placement(time).is_some()))
 }
 
-/// The parts of a shape during a run that ends at a time, s; none if it moves as a whole, or if parts of it are deformed.
+/// The parts of a shape during a run that ends at a time, s; none if it moves as a whole, or if parts of it
+/// are deformed.
 ///
 /// A union is divided until each of its parts moves as one.
 pub(super) fn of(

@@ -1,4 +1,4 @@
-//! How much room a scene has for its fluid, and what is said when that is too little.
+//! How much room a scene has for its fluid, and the messages if that is too little.
 
 use glam::DVec3;
 
@@ -15,14 +15,15 @@ use crate::sph::{MAX_SITES, SeedError};
 /// Points along the longest side of a box whose volume is estimated by sampling.
 const SAMPLES: f64 = 40.0;
 
-/// Halvings after which the border of an empty slab is known, to a part in 10¹² of the box.
+/// Number of halvings that find the border of an empty slab, to a part in 10¹² of the box.
 const HALVINGS: usize = 40;
 
 /// The least part of a fluid outside the box that is worth a warning: less is an edge between samples.
 const PART_OUTSIDE: f64 = 0.02;
 
-/// What is left of a box if slabs along its faces in which a field is proven to be negative are taken away; all of it if
-/// the whole is. Of a half-space, `z <= 0.5`, what lies in the box remains.
+/// The rest of a box without slabs along its faces in which a field is proven to be negative; the whole box
+/// if the field is negative in all of it. For a half-space such as `z <= 0.5`, the part inside the box
+/// remains.
 fn without_empty_sides(field: &dyn Field, whole: Aabb) -> Aabb {
     if field.range(&whole).hi < 0.0 {
         return whole;
@@ -55,8 +56,8 @@ fn without_empty_sides(field: &dyn Field, whole: Aabb) -> Aabb {
 }
 
 impl Experiment {
-    /// The box in which the shape of the fluid lies, m. No particle of the stated size may be larger than what of it lies
-    /// in the domain.
+    /// The box in which the shape of the fluid lies, m. No particle of the stated size may be larger than the
+    /// part of this box that lies in the domain.
     pub(super) fn reach(&self) -> Result<Aabb, Error> {
         let bounds = self.extent()?;
         let size = bounds.intersection(&self.scene.domain).size();
@@ -295,7 +296,7 @@ impl Experiment {
         Ok(room.min(wanted as f64))
     }
 
-    /// What there is to say of the place of the fluid before any of its particles is placed.
+    /// Messages about the place of the fluid before any of its particles is placed.
     pub fn foreseen(&self) -> Vec<Diagnostic> {
         match self.estimated_particles() {
             Ok(_) => self.reach().ok().and_then(|bounds| self.outside(&bounds)).into_iter().collect(),

@@ -1,4 +1,4 @@
-//! How fast the walls of a scene move at most, and in which time they hardly move.
+//! The greatest speed of the walls of a scene, and the time in which they hardly move.
 
 use std::sync::Arc;
 
@@ -15,36 +15,38 @@ const TIMES: usize = 96;
 /// Starts along each axis of the box, from which places of the surface are sought.
 const SIDE: usize = 6;
 
-/// After which part of a run the speed of a wall is looked at once more.
+/// The part of a run after which the speed of a wall is looked at again.
 const SOON: f64 = 1e-7;
 
-/// How much of a way the change of a wall's speed may make: as much as a vibration of a hundredth of the support radius does
-/// in a sixth of its period.
+/// The change of a wall's speed may make this much of a way: as much as a vibration of a hundredth of the
+/// support radius makes in a sixth of its period.
 const CHANGE: f64 = 1.0 / 16.0;
 
 /// Steps of Newton's method onto the surface, which begins far from it where a body is larger than the box.
 const STEPS: usize = 8;
 
-/// The part of the box's longest side that is no step any more.
+/// Newton steps shorter than this part of the box's longest side end the search.
 const CLOSE: f64 = 1e-6;
 
 /// The part of the box's longest side within which a place counts as one of the surface.
 const NEAR: f64 = 1e-3;
 
-/// How far a body's pressure reaches into a fluid, over its greatest size: that of a ball has fallen to a fortieth there.
+/// Reach of a body's pressure in a fluid, in units of its greatest size. At this distance the pressure of a
+/// ball has fallen to a fortieth.
 const REACH: f64 = 4.0;
 
 /// How often a stretch of time is halved in search of a motion that is short.
 const HALVINGS: usize = 12;
 
-/// The greatest speed, m/s, with which a solid's surface drives the fluid in a box during a run: that along its normal, or
-/// the whole if the fluid sticks to it; `belt` is its motion within the surface where that is stated. A surface with the
-/// acceleration a raises pressures up to ρ·a·L over a length L, that of the box or of some bodies, as a speed of √(a·L) does:
-/// what swings fast without getting far would else drive a fluid with a sound so slow that it resounds. Zero for a solid
-/// at rest.
+/// The greatest speed, m/s, with which a solid's surface drives the fluid in a box during a run: that along
+/// its normal, or the whole if the fluid sticks to it; `belt` is its motion within the surface where that is
+/// stated. A surface with the acceleration a raises pressures up to ρ·a·L over a length L, that of the box or
+/// of some bodies, as a speed of √(a·L) does: otherwise a body that swings fast over a short way would drive
+/// a fluid whose sound is so slow that it resounds. Zero for a solid at rest.
 ///
-/// It is found at some places and times, so a wall that moves during a hundredth of the run alone may be missed. Solids of
-/// many parts are not looked at: their gradients would be one large program, which nothing else needs.
+/// The speed is found at some places and times, so a wall that moves only during a hundredth of the run may
+/// be missed. Solids of many parts are not looked at: their gradients would be one large program, which
+/// nothing else needs.
 pub(super) fn greatest(
     solid: &Solid,
     (slip, belt): (Slip, Option<Arc<VectorField>>),
@@ -65,7 +67,7 @@ pub(super) fn greatest(
         let velocity = now.wall_velocity(p);
         let along = match (slip, &belt) {
             (Slip::Free, _) => 0.0,
-            // of a solid at rest, which knows no time, the surface may move all the same
+            // the surface of a solid at rest, which knows no time, may still move
             (Slip::No, Some(belt)) => belt(p, time).length(),
             (Slip::No, None) => velocity.length(),
         };
@@ -78,11 +80,12 @@ pub(super) fn greatest(
     greatest
 }
 
-/// A time, s, in which a solid's surface in a box moves by no more than `way`, m, along its normal, and in which its speed
-/// changes by no more than a small part of that: at most the whole run. `None` if no place of its surface is found.
+/// A time, s, in which a solid's surface in a box moves by at most `way`, m, along its normal, and in which
+/// its speed changes by at most a small part of that. It is at most the whole run. `None` if no place of its
+/// surface is found.
 ///
-/// Its speed is looked at in some instants, and between each two of them how far it has moved from one to the next. Where that
-/// is too far, the half in which it moves farther is looked at in the same way.
+/// The speed is found at some instants, and between each two of them the way that the surface has moved.
+/// Where that way is too long, the half in which it moves farther is looked at in the same way.
 pub(super) fn time_for(solid: &Solid, way: f64, domain: &Aabb, until: f64) -> Option<f64> {
     let mut time: Option<f64> = None;
     at_places(solid, domain, until, |(_, [now, later]), (p, normal)| {
@@ -97,7 +100,8 @@ pub(super) fn time_for(solid: &Solid, way: f64, domain: &Aabb, until: f64) -> Op
     Some(stretches.fold(time?, f64::min))
 }
 
-/// The length, s, of a part of a stretch of time in which the surface moves by no more than `way`, m: where it moves fastest.
+/// The length, s, of the part of a stretch of time in which the surface moves fastest, and by at most `way`,
+/// m.
 fn quiet_time(solid: &Solid, way: f64, domain: &Aabb, [mut from, mut to]: [f64; 2]) -> Option<f64> {
     let mut moved = farthest(solid, domain, [from, to])?;
     for _ in 0..HALVINGS {
@@ -112,8 +116,9 @@ fn quiet_time(solid: &Solid, way: f64, domain: &Aabb, [mut from, mut to]: [f64; 
     Some(to - from)
 }
 
-/// How far places of the surface at a time, s, are from the surface at another one, m, at most, the error of these places
-/// included, which is small beside what a wall moves in a run; [`moved`] is without it.
+/// The greatest distance, m, of places of the surface at a time, s, from the surface at another time. The
+/// error of these places is included, which is small beside the motion of a wall in a run; [`moved`] is
+/// without it.
 fn farthest(solid: &Solid, domain: &Aabb, [from, to]: [f64; 2]) -> Option<f64> {
     let (now, then) = (solid.at(from), solid.at(to));
     let ways = (0..SIDE.pow(3)).filter_map(|start| on_surface(&now, domain, start)).map(|(p, _)| {
@@ -123,8 +128,8 @@ fn farthest(solid: &Solid, domain: &Aabb, [from, to]: [f64; 2]) -> Option<f64> {
     ways.filter(|way| way.is_finite()).reduce(f64::max)
 }
 
-/// How far places of a solid's surface in a box move along their normals from one time, s, to another, m, at most. `None` if no
-/// place of its surface is found.
+/// The greatest way, m, that places of a solid's surface in a box move along their normals from one time, s,
+/// to another. `None` if no place of its surface is found.
 pub(super) fn moved(solid: &Solid, domain: &Aabb, [from, to]: [f64; 2]) -> Option<f64> {
     let (now, then) = (solid.at(from), solid.at(to));
     let distance = |solid: &Solid, p: DVec3| {
@@ -138,8 +143,8 @@ pub(super) fn moved(solid: &Solid, domain: &Aabb, [from, to]: [f64; 2]) -> Optio
     ways.filter(|way| way.is_finite()).reduce(f64::max)
 }
 
-/// Calls `see` with some times of a run, s, the solid at that time and a little later, and with places of its surface in a
-/// box and their normals.
+/// Calls `see` with some times of a run, s, the solid at that time and a little later, and with places of its
+/// surface in a box and their normals.
 fn at_places(
     solid: &Solid,
     domain: &Aabb,
