@@ -1,7 +1,8 @@
-//! Ground from a map of heights: h(x, y) − z, with h between the nodes of a rectangular grid from the four nearest ones.
+//! Ground from a map of heights: h(x, y) − z, with h between the nodes of a rectangular grid from the four
+//! nearest ones.
 //!
-//! Beyond the map, the height is that of its border. The least and the greatest height of each square of nodes, of squares
-//! of squares and so on, give ranges over boxes at once.
+//! Beyond the map, the height is that of its border. The least and the greatest height of each square of
+//! nodes, of squares of squares and so on, give ranges over boxes at once.
 
 use std::fmt;
 
@@ -20,7 +21,7 @@ const MOST_CELLS: usize = 64;
 /// Over more cells than this the heights are only known to be between those of the nodes around.
 const FEW_CELLS: usize = 9;
 
-/// What rounding may add to a height, relative to all that it is made of.
+/// The most that rounding may add to a height, relative to all terms of the height.
 const ROUNDING: f64 = 16.0 * f64::EPSILON;
 
 /// Heights on a grid.
@@ -31,7 +32,7 @@ pub struct HeightMap {
     heights: Vec<f64>,
     corner: DVec2,
     spacing: DVec2,
-    /// The slopes along x and y between neighbours, at most.
+    /// The greatest slopes along x and y between neighbours.
     steepest: DVec2,
     /// The least and the greatest height of blocks of 2ⁿ × 2ⁿ nodes, for n = 0 and so on.
     levels: Vec<Level>,
@@ -46,7 +47,8 @@ struct Level {
 }
 
 impl HeightMap {
-    /// A map over the rectangle between two corners, from rows of heights, that of the greatest y first as in a picture.
+    /// A map over the rectangle between two corners, from rows of heights, that of the greatest y first as in
+    /// a picture.
     ///
     /// # Errors
     /// What is wrong with the heights or with the rectangle.
@@ -121,7 +123,8 @@ impl HeightMap {
         [node(i, j), node(i + 1, j), node(i, j + 1), node(i + 1, j + 1)]
     }
 
-    /// The cells between two places, if they are few, each with the parts of it along x and along y that lie between them.
+    /// The cells between two places, if they are few, each with the parts of it along x and along y that lie
+    /// between them.
     fn few_cells(
         &self,
         low: DVec2,
@@ -141,7 +144,8 @@ impl HeightMap {
         })
     }
 
-    /// What the slope along an axis may be between two places that few cells hold. In a cell it is linear across the axis.
+    /// What the slope along an axis may be between two places that few cells hold. In a cell it is linear
+    /// across the axis.
     fn slopes_along(&self, axis: usize, low: DVec2, high: DVec2) -> Option<Interval> {
         let (mut least, mut greatest) = (f64::INFINITY, f64::NEG_INFINITY);
         for (cell, parts) in self.few_cells(low, high, MOST_CELLS)? {
@@ -172,7 +176,7 @@ impl HeightMap {
         }
         let first = [0, 1].map(|axis| self.cell(axis, low[axis]).0);
         let last = [0, 1].map(|axis| self.cell(axis, high[axis]).0 + 1);
-        // so many nodes that at most three blocks lie side by side
+        // so many that at most three blocks lie side by side
         let side = (last[0] - first[0]).max(last[1] - first[1]);
         let level = (usize::BITS - (side / 2).leading_zeros()).min(self.levels.len() as u32 - 1);
         let Level { counts, ranges } = &self.levels[level as usize];
@@ -187,8 +191,8 @@ impl HeightMap {
     }
 }
 
-/// The height in a cell, at parts of it along x and y, from those at its corners. The weights of one sum: it is never beyond
-/// those of the corners by more than rounding.
+/// The height in a cell, at parts of it along x and y, from those at its corners. The weights of one sum: it
+/// is never beyond those of the corners by more than rounding.
 fn bilinear([a, b, c, d]: [f64; 4], u: f64, v: f64) -> f64 {
     let (low, high) = (a * (1.0 - u) + b * u, c * (1.0 - u) + d * u);
     low * (1.0 - v) + high * v

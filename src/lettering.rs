@@ -81,8 +81,8 @@ fn paths(svg: &str, text: Node<'_, '_>) -> String {
     parts.iter().zip(starts).map(path).collect()
 }
 
-/// A closed outline of Bézier curves of third order, each of which begins where the one before ends. Straight pieces are
-/// such curves too.
+/// A closed outline of Bézier curves of third order, each of which begins where the one before ends. Straight
+/// pieces are such curves too.
 pub(crate) type Contour = Vec<[[f64; 2]; 4]>;
 
 /// The outlines of each glyph of a line of text that begins at the origin, in heights of a capital letter; y points up.

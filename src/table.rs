@@ -17,8 +17,8 @@ pub trait Table: Debug + Send + Sync {
     /// An interval that holds the value at every point of a box, exact or computed. Ends of the box may be infinite.
     fn range(&self, over: &Aabb) -> Interval;
 
-    /// For each axis, an interval that holds the derivative along it at every point of a box, exact or computed. Ends of
-    /// the box may be infinite.
+    /// For each axis, an interval that holds the derivative along it at every point of a box, exact or
+    /// computed. Ends of the box may be infinite.
     fn slopes(&self, over: &Aabb) -> [Interval; 3];
 
     /// A box around the points whose value is at least `least`.
@@ -27,7 +27,7 @@ pub trait Table: Debug + Send + Sync {
     /// What it is, with its article, in messages.
     fn what(&self) -> &'static str;
 
-    /// What tells this table from one with other values.
+    /// A hash of the values, which distinguishes this table from others.
     fn fingerprint(&self) -> String;
 }
 

@@ -112,7 +112,7 @@ impl Filled {
 /// An edge is divided again while the last division has moved its crossing by more than this part of it.
 const MOVED: f64 = 0.02;
 
-/// Divisions of an edge at most.
+/// Maximum number of divisions of an edge.
 const DIVISIONS: usize = 8;
 
 /// Where the surface crosses an edge, from a corner inside to one outside, with their ω: by the rule of false position,

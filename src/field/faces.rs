@@ -28,10 +28,11 @@ pub enum Part {
 /// A tree of faces in prefix order: each node is followed by its parts. It is empty if no surface is near.
 pub type Faces = SmallVec<[Part; 16]>;
 
-/// The faces of a tree that a body outside may touch: all parts of unions, and of an intersection those of the part of which
-/// it is farthest.
+/// The faces of a tree that a body outside may touch: all parts of unions, and of an intersection those of
+/// the part of which it is farthest.
 pub(crate) fn standing_faces(faces: &[Part]) -> SmallVec<[Face; 8]> {
-    /// Adds those of the tree that begins at a part. Returns how far the body is from that tree, and where the next one begins.
+    /// Adds those of the tree that begins at a part. Returns how far the body is from that tree, and where
+    /// the next one begins.
     fn of_tree(faces: &[Part], at: usize, found: &mut SmallVec<[Face; 8]>) -> (f64, usize) {
         let Some(part) = faces.get(at) else { return (f64::INFINITY, at) };
         match *part {
@@ -64,8 +65,8 @@ pub(crate) fn standing_faces(faces: &[Part]) -> SmallVec<[Face; 8]> {
     found
 }
 
-/// The face that is the obstacle's surface nearest to the point; `None` for a tree without faces. Of an intersection it
-/// is the farthest face, of a union the nearest.
+/// The face that is the obstacle's surface nearest to the point; `None` for a tree without faces. For an
+/// intersection it is the farthest face, for a union the nearest.
 pub(crate) fn surface_face(faces: &[Part]) -> Option<Face> {
     fn of_tree(faces: &[Part], at: &mut usize) -> Option<Face> {
         let part = *faces.get(*at)?;
@@ -91,7 +92,8 @@ pub(crate) fn surface_face(faces: &[Part]) -> Option<Face> {
 mod tests {
     use super::*;
 
-    /// Below a cup a body touches its underside, however near the wall of its hollow is: it is behind the hollow's floor.
+    /// Below a cup a body touches its underside, however near the wall of its hollow is: it is behind the
+    /// hollow's floor.
     #[test]
     fn of_a_cup_the_underside_stands_before_a_body_below() {
         let face = |distance: f64, normal: DVec3| Part::Face(Face { distance, normal, mean_curvature: 0.0 });

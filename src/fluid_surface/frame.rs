@@ -36,7 +36,7 @@ pub fn read_points(file: &[u8]) -> Result<Vec<DVec3>, FrameError> {
 /// of them have it.
 ///
 /// # Errors
-/// As [`read_points`].
+/// See [`read_points`].
 pub fn read_arrays(file: &[u8]) -> Result<(Vec<DVec3>, Vec<PointArray>), FrameError> {
     let (mut points, mut arrays) = (Vec::new(), Vec::<PointArray>::new());
     for_each_piece(file, |piece, storage| {
@@ -71,7 +71,7 @@ pub fn read_arrays(file: &[u8]) -> Result<(Vec<DVec3>, Vec<PointArray>), FrameEr
 /// triangles.
 ///
 /// # Errors
-/// As [`read_points`]; also if a face is no triangle, or has a corner that is not there.
+/// Those of [`read_points`], and if a face is no triangle or has a corner that does not exist.
 pub fn read_mesh(file: &[u8]) -> Result<Mesh, FrameError> {
     let mut triangles = Vec::new();
     let mut before = 0;

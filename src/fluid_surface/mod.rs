@@ -40,8 +40,8 @@ pub struct Reconstruction {
     /// Beyond this distance a particle has no weight. It is twice the smoothing length, which splashsurf
     /// advises to be twice the radius. Larger ones smooth the surface and blunt it.
     pub support_radius: f64,
-    /// The side of a marching-cubes cell. splashsurf advises half the radius. From a whole radius on, single
-    /// particles show as facets.
+    /// The side of a marching-cubes cell. splashsurf advises half the radius. With a whole radius or more,
+    /// single particles show as facets.
     pub cell: f64,
     /// The part of the rest density at which the surface lies. splashsurf advises 0.6, with which a
     /// half-space full of particles keeps about its volume.

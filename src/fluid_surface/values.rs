@@ -4,8 +4,8 @@ use glam::DVec3;
 use rayon::prelude::*;
 use rustc_hash::FxHashMap;
 
-/// The values at places: the mean of those of the particles within `reach` in metres, near ones counting most. NaN where there
-/// is none. Particles that are nowhere, or have no value, do not count.
+/// The values at places: the mean of those of the particles within `reach` in metres, near ones counting
+/// most. NaN where there is none. Particles without a finite place or without a value do not count.
 pub fn values_at(places: &[DVec3], particles: &[DVec3], values: &[f64], reach: f64) -> Vec<f64> {
     // `as` saturates, and what is so far away has no neighbours
     let cell = |p: DVec3| (p / reach).to_array().map(|x| x.floor() as i64);

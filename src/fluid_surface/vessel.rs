@@ -9,8 +9,8 @@ use glam::DVec3;
 use crate::geom::Aabb;
 use crate::mesh::Mesh;
 
-/// The mirror images behind the walls of a box of all particles that are nearer to a wall than `reach`, also those behind
-/// its edges and corners.
+/// The mirror images behind the walls of a box of all particles that are nearer to a wall than `reach`, also
+/// those behind its edges and corners.
 pub(super) fn images(particles: &[DVec3], vessel: &Aabb, reach: f64) -> Vec<DVec3> {
     let mut images: Vec<DVec3> = Vec::new();
     for axis in 0..3 {

@@ -2,8 +2,8 @@
 
 use glam::{DMat3, DVec3};
 
-/// Sweeps of Jacobi's method at most. A symmetric 3×3 matrix is diagonal to the last digit after four
-/// or five.
+/// Maximum number of sweeps of Jacobi's method. A symmetric 3×3 matrix is diagonal to the last digit after
+/// four or five.
 const SWEEPS: usize = 10;
 
 /// Eigenvalues and orthonormal eigenvectors (columns) of a symmetric matrix, by Jacobi's rotations.

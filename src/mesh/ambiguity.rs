@@ -19,8 +19,8 @@
 //! Where ω itself is not as its values say, see `diagonals`, it decides about a face, and no tunnel is sought.
 //!
 //! The values are those of [`crate::field::Field::continuous`] at the grid's nodes. For a solid they come
-//! from the min/max twin, whose sign is that of ω; with a cell map from its leaves, which give the same but for rounding. Ties count as outside, as ω =
-//! 0 does everywhere.
+//! from the min/max twin, whose sign is that of ω; with a cell map from its leaves, which give the same but
+//! for rounding. Ties count as outside, as ω = 0 does everywhere.
 //!
 //! Invariant: a decision about a face depends on its four values alone and not on their order, so both cells
 //! at the face decide alike.

@@ -87,8 +87,8 @@ struct EdgeFindings {
     count: usize,
     closed: bool,
     two_sided: bool,
-    /// The number of fans of triangles around vertices, joined across edges. A manifold has as many
-    /// as vertices.
+    /// The number of fans of triangles around vertices, joined across edges. A manifold has one for each
+    /// vertex.
     fans: usize,
 }
 
@@ -156,7 +156,7 @@ fn distances(mesh: &Mesh, field: &dyn Field) -> (f64, f64) {
     (max, (sum / on_surface.len().max(1) as f64).sqrt())
 }
 
-/// Newton steps at most. Two are enough where ω is smooth; a double root gains one bit with each.
+/// Maximum number of Newton steps. Two are enough where ω is smooth; a double root gains one bit with each.
 const NEWTON_STEPS: usize = 8;
 
 /// The distance of each point from ω = 0: the way that Newton's method along ∇ω takes to the surface. The
@@ -201,13 +201,15 @@ fn project(field: &dyn Field, points: &[DVec3], (largest, edge): (f64, f64)) -> 
         .collect()
 }
 
-/// Radii are doubled so many times at once until ω changes sign, and one by one from the last at which it did not.
+/// Radii are doubled this many times at once until ω changes sign, and then one by one from the last radius
+/// without a change.
 const STRIDE: usize = 5;
 
 /// Doublings from the rounding of coordinates to a quarter of their size.
 const DOUBLINGS: usize = 50;
 
-/// Directions in which a surface is looked for that is said to be farther than an edge, from two edges inwards.
+/// Directions in which to look for a surface that should be farther away than an edge, starting two edges
+/// inwards.
 const DIRECTIONS: usize = 200;
 const FINE_RADII: i32 = 8;
 

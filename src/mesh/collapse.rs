@@ -85,8 +85,8 @@ impl<'a> Fans<'a> {
         found
     }
 
-    /// A pair (kept, lost) of the vertices whose edge may be contracted. `None` if there is none. Of a vertex
-    /// on ω = 0 and one of a cap, the first is kept.
+    /// A pair (kept, lost) of the vertices whose edge may be contracted. `None` if there is none. If one
+    /// vertex is on ω = 0 and the other on a cap, the first is kept.
     fn contractible(&self, vertices: &[u32]) -> Option<(u32, u32)> {
         for (i, &a) in vertices.iter().enumerate() {
             let around = self.neighbours(a);

@@ -41,7 +41,7 @@ impl<'a> ProgressPart<'a> {
         Self { tasks, done: AtomicUsize::new(0), shares, watch }
     }
 
-    /// Does a task, unless the work is to end, and tells that it is done.
+    /// Does a task, unless the work is to end, and reports that it is done.
     ///
     /// # Errors
     /// Those of the task, and [`MeshError::Ended`].

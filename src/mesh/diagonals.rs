@@ -1,10 +1,11 @@
 //! Decisions about ambiguous faces by ω itself.
 //!
-//! On a face of a cell whose corners lie inside and outside in turn, the values at the corners say which of them are joined
-//! if ω is bilinear. At the rim of a wedge it is not: a node just inside the rim has a small value, and would be parted from
-//! the solid behind it, as a crumb beside the edge. But a solid that holds all of the straight line from one corner to the
-//! other joins them whatever the values are, and likewise for the fluid. So ω is asked along the diagonal that has the sign
-//! of the face's middle. Where ω is bilinear the values decide.
+//! On a face of a cell whose corners lie inside and outside in turn, the values at the corners say which of
+//! them are joined if ω is bilinear. At the rim of a wedge it is not: a node just inside the rim has a small
+//! value, and would be parted from the solid behind it, as a crumb beside the edge. But a solid that holds
+//! all of the straight line from one corner to the other joins them whatever the values are. The same holds
+//! for the fluid. So ω is asked along the diagonal that has the sign of the face's middle. Where ω is
+//! bilinear the values decide.
 //!
 //! Invariant: a decision depends on the face's corners and not on their order, so both cells at the face decide alike.
 
@@ -13,9 +14,9 @@ use glam::DVec3;
 use super::cases::Ambiguous;
 use crate::field::{Field, Points};
 
-/// Places from the middle of a diagonal to one of its ends, as parts of it: even ones, and then ever nearer to the end, beside
-/// which a small value may dip below zero. All have few binary digits, so that a part and what is left of the whole are exact,
-/// and with them the places are the same bits from either end.
+/// Places from the middle of a diagonal to one of its ends, as parts of it: even ones, and then ever nearer
+/// to the end, beside which a small value may dip below zero. All have few binary digits, so that a part and
+/// what is left of the whole are exact, and with them the places are the same bits from either end.
 const PLACES: [f64; 18] = [
     7.0 / 16.0,
     3.0 / 8.0,
@@ -43,9 +44,9 @@ const BILINEAR: f64 = 1e-9;
 /// The corners around a face, with their values.
 pub(super) type FaceCorners = [(DVec3, f64); 4];
 
-/// How the corners of ambiguous faces are joined. Each face is given by its corners and their values, around it, of which the
-/// first and the third are inside. `None` where ω is bilinear, or where ω along the diagonals leaves the choice. Adds to the
-/// number of evaluations.
+/// How the corners of ambiguous faces are joined. Each face is given by its corners and their values, around
+/// it, of which the first and the third are inside. `None` where ω is bilinear, or where ω along the
+/// diagonals leaves the choice. Adds to the number of evaluations.
 pub(super) fn joined(
     field: &dyn Field,
     faces: &[FaceCorners],

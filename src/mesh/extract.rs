@@ -29,9 +29,9 @@ use crate::mesh::Watch;
 /// The surface ω = 0 of a field as a closed mesh. It is empty if no node of the grid lies inside.
 ///
 /// Inside is strictly ω > 0. Everything outside the grid counts as outside, so a solid cut by the border is
-/// closed by faces on it (see [`Mesh::caps`]). `watch` is told the share of tasks
-/// done, and may end them. Source: W. Lorensen, H. Cline, Marching cubes, SIGGRAPH
-/// 1987, with the decisions about ambiguous cells of `ambiguity`.
+/// closed by faces on it (see [`Mesh::caps`]). `watch` receives the completed share of the tasks, and may end
+/// them. Source: W. Lorensen, H. Cline, Marching cubes, SIGGRAPH 1987, with the decisions about ambiguous
+/// cells of `ambiguity`.
 ///
 /// # Errors
 /// [`MeshError::NotANumber`] if ω is NaN at a node or on an edge that crosses the surface,

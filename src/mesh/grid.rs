@@ -34,7 +34,7 @@ pub enum GridError {
     TooFewCells(usize),
     /// The cell's side is not a positive finite number, or `f64` cannot resolve it at these coordinates.
     BadSpacing(f64),
-    /// An axis would need so many cells, more than [`Grid::MAX_CELLS`].
+    /// An axis would need this number of cells, which is more than [`Grid::MAX_CELLS`].
     TooManyCells(f64),
 }
 

@@ -228,7 +228,7 @@ fn mixed(cube: Cube, below: usize) -> usize {
     (mix >> 32) as usize & (below - 1)
 }
 
-/// A few bits that tell of most cubes that they are not marked.
+/// A few bits that rule out most unmarked cubes.
 struct Filter(Vec<u64>);
 
 impl Filter {

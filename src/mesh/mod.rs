@@ -11,10 +11,10 @@
 //! each vertex on the surface, vertices that coincide in a node are merged, and normals are −∇ω/|∇ω|.
 //!
 //! What is promised: the mesh is closed; every edge lies in exactly two triangles, which run along it in
-//! opposite directions; triangles are counter-clockwise as seen from the fluid; the topology is that of
-//! the trilinear interpolant of ω at the nodes, but where ω at many places of a diagonal of a face says that its
-//! corners are joined in another way, as beside a sharp rim; the same field and grid give the same bits on any
-//! number of threads.
+//! opposite directions; triangles are counter-clockwise as seen from the fluid; the topology is that of the
+//! trilinear interpolant of ω at the nodes, except where ω at many places of a diagonal of a face shows that
+//! its corners are joined in another way, as beside a sharp rim; the same field and grid give the same bits
+//! on any number of threads.
 //!
 //! What is not promised: marching cubes cut creases between nodes; features thinner than a cell may be
 //! missed, although they are counted; there is no surface where the field touches zero without a change
@@ -120,8 +120,8 @@ impl Mesh {
         }
     }
 
-    /// The parts of a mesh, told apart by a whole number from 0 to `count` − 1 at each vertex; `None` if numbers are
-    /// missing or others, or a triangle has corners in several parts.
+    /// The parts of a mesh, distinguished by a whole number from 0 to `count` − 1 at each vertex; `None` if
+    /// numbers are missing or invalid, or a triangle has corners in several parts.
     pub fn divided(&self, part_of: &[f64], count: usize) -> Option<Vec<Self>> {
         if part_of.len() != self.positions.len() || self.normals.len() != self.positions.len() {
             return None;
@@ -176,7 +176,7 @@ pub struct Work {
 /// Why a field could not be meshed.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum MeshError {
-    /// ω is not a number at a point, so nobody can say whether the point is inside.
+    /// ω is not a number at a point, so it cannot be decided whether the point is inside.
     NotANumber {
         /// The first such point in the order of the search, in metres.
         at: DVec3,
@@ -186,7 +186,7 @@ pub enum MeshError {
         /// The number of vertices that was found.
         found: usize,
     },
-    /// The work was ended by who waited for it, see [`Watch::is_over`].
+    /// The caller ended the work, see [`Watch::is_over`].
     Ended,
 }
 

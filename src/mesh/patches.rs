@@ -150,8 +150,8 @@ impl CellValues {
         }
     }
 
-    /// The cell's loops of crossed edges, and the two of them that bound a tunnel, if any do. Where ω is not as its values
-    /// say, there is none.
+    /// The cell's loops of crossed edges, and the two of them that bound a tunnel, if any do. Where ω is not
+    /// as its values say, there is none.
     pub(super) fn loops(&self) -> (Vec<Vec<usize>>, Option<Tunnel>) {
         let polygons = loops(ambiguity::inside(&self.values), self.faces);
         let tunnel = if self.is_kinked { None } else { ambiguity::tunnel(&self.values, &polygons) };

@@ -1,5 +1,5 @@
-//! How far a mesh is from the surface that it stands for, both ways; how its triangles face, and how well
-//! they are shaped.
+//! The distance between a mesh and the surface that it stands for, both ways; the direction and the shape of
+//! its triangles.
 //!
 //! From the mesh to the surface: points are spread over every triangle, and Newton's method moves each of
 //! them to the surface. The way that it goes is at least its distance. From the surface to the mesh: points
@@ -272,7 +272,7 @@ struct Foot {
     normal: Option<DVec3>,
 }
 
-/// Newton steps at most. A point beside a crease goes to and fro between its faces, nearer each time.
+/// Maximum number of Newton steps. A point beside a crease jumps between its faces, nearer each time.
 const STEPS: usize = 24;
 
 /// The points of the surface to which Newton's method leads.

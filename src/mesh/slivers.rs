@@ -22,7 +22,7 @@ pub(super) const SLIVER: f64 = 0.1;
 /// they hardly have a direction.
 const LARGEST_TURN: f64 = 0.7;
 
-/// Passes over the mesh at most. After the third few slivers give way.
+/// Maximum number of passes over the mesh. After the third few slivers give way.
 const PASSES: usize = 4;
 
 /// The roundness 4√3 · area / (sum of the squared sides): 1 for an equilateral triangle, 0 for one

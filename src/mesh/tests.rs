@@ -132,7 +132,8 @@ fn touching_and_overlapping_balls() {
     assert_eq!((overlapping.components, overlapping.euler), (1, 2));
     let lens = PI * 0.1_f64.powi(2) * (3.0 * 0.5 - 0.1) / 3.0;
     assert_close(overlapping.volume, 2.0 * (4.0 / 3.0 * PI * 0.125 - lens), 0.01);
-    // Touching in a node, the balls stay apart; touching within a cell, they cannot be told from overlapping.
+    // Touching in a node, the balls stay apart; touching within a cell, they cannot be distinguished from
+    // overlapping ones.
     for (cells, solids) in [(20, 2), (21, 1)] {
         let (_, touching) = check_filling(&pair(0.0), &cube(1.0), cells);
         assert_eq!((touching.solids, touching.degenerate), (solids, 0));

@@ -1,13 +1,13 @@
-//! What a grid cannot see: parts of a solid, or gaps in it, that are thinner than a cell. They may pass between
-//! the nodes, or beside triangles that show something else.
+//! Parts that a grid cannot see: parts of a solid, or gaps in it, that are thinner than a cell. They may pass
+//! between the nodes, or beside triangles that show something else.
 //!
 //! A cell holds what the grid says if every face in it is known: it faces nearly as the surface does where it
-//! crosses an edge of the grid within a cell around, and no two faces back onto each other unless the
-//! cell's own edges show both. Ranges of the derivatives prove that for most cells, eight cells at a time
-//! where the surface is smooth. All others are looked into: they are divided, and from each part the surface
-//! is sought along the gradient of every face that may be in it. A point with a change of sign whose face is
-//! not known is a witness, and its cell is counted. So creases, bulges, faces that coincide and fields that
-//! touch zero are not counted, since they have no witness; nor are steps and edges of parts and gaps that are
+//! crosses an edge of the grid within a cell around, and no two faces back onto each other unless the cell's
+//! own edges show both. Ranges of the derivatives prove that for most cells, eight cells at a time where the
+//! surface is smooth. All other cells are searched: they are divided, and from each part the surface is
+//! sought along the gradient of every face that may be in it. A point with a change of sign whose face is not
+//! known is a witness, and its cell is counted. So creases, bulges, faces that coincide and fields that touch
+//! zero are not counted, since they have no witness; nor are steps and edges of parts and gaps that are
 //! thicker than two cells.
 //!
 //! Invariant: unless the search was ended, a cell that is not counted is proven to hold what the grid says, or it was
@@ -37,8 +37,8 @@ pub use found::ThinCells;
 
 /// Counts the cells of a grid in which [`marching_cubes`](super::marching_cubes) misses a part of the surface.
 ///
-/// The search takes as long as the surface is intricate. If `watch` ends it, what was found so far is returned, and
-/// [`ThinCells::ended`] says so. How far it is, nobody is told.
+/// The search takes as long as the surface is intricate. If `watch` ends it, what was found so far is
+/// returned, and [`ThinCells::ended`] says so. Progress is not reported.
 ///
 /// # Errors
 /// [`MeshError::NotANumber`] if ω is NaN at a node.
@@ -93,7 +93,7 @@ impl Search<'_> {
     /// The thin cells in a cube of cells, whose first cell is counted from the brick's first.
     fn count(&self, first: [usize; 3], size: usize) -> ThinCells {
         let low = [0, 1, 2].map(|axis| self.low[axis] + first[axis]);
-        // cells of the ring, below the first node of the grid or from the last node on, have no extent
+        // A structure with a line for each field and its comment.
         let beyond = (0..3).any(|axis| low[axis] + size <= 1 || low[axis] > self.cells[axis]);
         if beyond {
             return ThinCells::NONE;

@@ -22,7 +22,7 @@ pub struct Volume {
     pub area_error: f64,
     /// The number of separate solids in the finer mesh.
     pub solids: usize,
-    /// The number of separate solids in the coarser mesh. If it is another one, neither is certain.
+    /// The number of separate solids in the coarser mesh. If the two numbers differ, neither is certain.
     pub solids_coarser: usize,
 }
 
@@ -58,8 +58,8 @@ impl std::fmt::Display for VolumeError {
 
 impl std::error::Error for VolumeError {}
 
-/// Finds the volume of a solid on meshes with `cells` cells, two thirds and half as many along the longest side of its
-/// bounds. `watch` may end the work; how far it is, nobody is told.
+/// Finds the volume of a solid on meshes with `cells` cells, two thirds and half as many along the longest
+/// side of its bounds. `watch` may end the work; progress is not reported.
 ///
 /// # Errors
 /// [`VolumeError`] if one of the meshes cannot be made, or is empty.
@@ -85,8 +85,8 @@ pub fn volume(
     if fine[1] == 0.0 {
         return Err(VolumeError::TooThin);
     }
-    // edges that no vertex has caught lie unevenly between the cells, so the whole difference is given as the error,
-    // and as two sizes may agree by chance, a third one has a say
+    // edges that no vertex has caught lie unevenly between the cells, so the whole difference is given as the
+    // error; two sizes may agree by chance, so a third one is used as well
     let error = |i: usize| {
         let all = [fine[i] - coarse[i], fine[i] - middle[i], middle[i] - coarse[i]];
         all.into_iter().fold(ROUNDING * fine[i].abs(), |most, difference| most.max(difference.abs()))
@@ -102,9 +102,9 @@ pub fn volume(
     })
 }
 
-/// Where three areas lead to, of cells in the ratio of 4 to 3 to 2. Vertices lie on the surface, so that the error falls
-/// with the square of the cell; if it does not, a part has come in sight from one to the next, and the last one counts.
-/// Also whether it does.
+/// The limit of three areas, for cells in the ratio of 4 to 3 to 2, and whether they converge. Vertices lie
+/// on the surface, so the error falls with the square of the cell. If it does not, a part has become visible
+/// from one mesh to the next, and the last area counts.
 fn limit([coarse, middle, fine]: [f64; 3]) -> (f64, bool) {
     // (3² − 2²)/(4² − 2²), roughly
     let is_small = (fine - coarse).abs() <= LARGEST_STEP * fine;
@@ -112,10 +112,10 @@ fn limit([coarse, middle, fine]: [f64; 3]) -> (f64, bool) {
     (if falls { fine + (fine - coarse) / 3.0 } else { fine }, falls)
 }
 
-/// The volume between a mesh and the surface, m³, negative where the mesh is outside: the integral of the distance, to
-/// first order ω/|∇ω|, over the triangles. Vertices lie on the surface, so that the middles of the edges know what
-/// the curvature leaves out. A distance of more than a cell is one of a place where the mesh is wrong, and faces on
-/// the border of the grid are where the solid is cut.
+/// The volume between a mesh and the surface, m³, negative where the mesh is outside: the integral of the
+/// distance, to first order ω/|∇ω|, over the triangles. Vertices lie on the surface, so the middles of the
+/// edges show what the curvature leaves out. A distance of more than a cell occurs only where the mesh is
+/// wrong, and is cut off at a cell. Faces on the border of the grid, where the solid is cut, are left out.
 fn beyond(field: &dyn Field, mesh: &Mesh, cell: f64) -> f64 {
     let distance = |p: DVec3| {
         let (omega, gradient) = field.omega_grad(p);
@@ -143,7 +143,7 @@ const TRIANGLES_PER_PART: usize = 4096;
 /// Areas that differ by a larger part show something new rather than a smaller error.
 const LARGEST_STEP: f64 = 0.05;
 
-/// Where the error of an area does not fall as it should, so many times the differences are given.
+/// Safety factor on the differences where the error of an area does not fall as expected.
 const UNCERTAIN: f64 = 2.0;
 
 /// The least relative error: sums over many triangles are not more exact.
@@ -226,7 +226,7 @@ mod tests {
     fn areas_lead_to_a_limit_where_their_errors_fall_with_the_square_of_the_cell() {
         let areas = [4.0, 3.0, 2.0].map(|cell: f64| 10.0 - 0.01 * cell * cell);
         assert!((limit(areas).0 - 10.0).abs() < 1e-12);
-        // fins that only the last one shows, and some that the second one shows a part of
+        // fins that only the last mesh shows, and some of which the second one shows a part
         assert_eq!(limit([123.4, 150.0, 174.6]), (174.6, false));
         assert_eq!(limit([100.0, 110.0, 174.6]), (174.6, false));
         assert_eq!(limit([6.0, 6.0, 6.0]), (6.0, false));

@@ -1,8 +1,8 @@
-//! Who waits for long work: is told how far it is, and may end it.
+//! Progress and cancellation of long work.
 
 /// Waits for the making or the measuring of a mesh.
 ///
-/// A closure `|done: f64| …` is one that is told how far the work is and never ends it.
+/// A closure `|done: f64| …` receives the progress of the work and never ends it.
 pub trait Watch: Sync {
     /// Receives the share of the work that is done, in (0, 1]. It is called from any thread, not always in ascending
     /// order.
@@ -20,13 +20,14 @@ impl<F: Fn(f64) + Sync> Watch for F {
     }
 }
 
-/// Nobody: the work goes on to its end.
+/// No watch: the work runs to its end.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Unwatched;
 
 impl Watch for Unwatched {}
 
-/// Ends what another watch ends, and tells it nothing: each mesh is a part of the work.
+/// Forwards the cancellation of another watch, but reports no progress to it, because each mesh is only a
+/// part of the work.
 pub(super) struct Ends<'a>(pub &'a dyn Watch);
 
 impl Watch for Ends<'_> {

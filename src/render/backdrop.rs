@@ -415,7 +415,8 @@ mod tests {
             let [r, _, b] = centre(&frame(&scene, &[DVec3::X * x], &[1.0]), &scene);
             i32::from(r) - i32::from(b)
         };
-        // how red a ball is: before a plate as without one, behind glass less, behind water still less, behind stone not
+        // how red a ball is: before a plate as without one, behind glass less, behind water still less,
+        // behind stone not
         let bare = centre(
             &frame(&scene(MeshView::default()), &[DVec3::X * 0.5], &[1.0]),
             &scene(MeshView::default()),

@@ -126,8 +126,8 @@ impl Camera {
         self.eye + across.x * self.right - across.y * self.up - depth * self.back
     }
 
-    /// The nearness of a plane as a function of the place on the screen: n = a + b·x + c·y. `None` if the eye lies in the
-    /// plane.
+    /// The nearness of a plane as a function of the place on the screen: n = a + b·x + c·y. `None` if the eye
+    /// lies in the plane.
     pub(super) fn nearness_of(&self, plane: &Cut) -> Option<[f64; 3]> {
         let ahead = plane.offset - plane.normal.dot(self.eye);
         let normal = self.turn(plane.normal) / ahead;

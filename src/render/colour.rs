@@ -1,7 +1,8 @@
 //! Maps from values to colours. The first is blue for low, yellow for medium, red for high values.
 //!
-//! Every map is linear in the value, so pictures of different runs can be compared if their ranges are equal. People with
-//! red–green blindness can read them: none but viridis and cividis has a green, and these two also grow lighter all along.
+//! Every map is linear in the value, so pictures of different runs can be compared if their ranges are equal.
+//! People with red–green blindness can read them: none but viridis and cividis has a green, and these two
+//! also grow lighter all along.
 
 /// An sRGB colour with 8 bits per channel: red, green, blue.
 pub type Rgb = [u8; 3];
@@ -77,8 +78,9 @@ impl ColourMap {
         }
     }
 
-    /// The colour of a value on the map over the range `low` … `high`, all in the same unit. Values beyond the range have
-    /// the colours of its ends, all values that of the low end if the range is empty, and NaN is a grey of its own.
+    /// The colour of a value on the map over the range `low` … `high`, all in the same unit. Values beyond
+    /// the range have the colours of its ends, all values that of the low end if the range is empty, and NaN
+    /// is a grey of its own.
     pub fn colour(self, value: f64, (low, high): (f64, f64)) -> Rgb {
         if value.is_nan() {
             return UNKNOWN;

@@ -39,8 +39,8 @@ pub struct Apng<W: Write> {
 }
 
 impl<W: Write> Apng<W> {
-    /// Begins a film of so many pictures that repeats for ever. `size` is the width and the height in pixels, `rate` the
-    /// number of pictures in a second.
+    /// Begins a film of the given number of pictures, which repeats for ever. `size` is the width and the
+    /// height in pixels, `rate` the number of pictures in a second.
     ///
     /// # Errors
     /// Those of `out`, and of a film without pictures.
@@ -54,7 +54,7 @@ impl<W: Write> Apng<W> {
         Ok(Self { writer: encoder.write_header()?, size: (width, height), before: None })
     }
 
-    /// Adds a picture. Of all but the first only the part that changes is stored.
+    /// Adds a picture. After the first picture, only the part that changes is stored.
     ///
     /// # Errors
     /// Those of the stream, and of a picture of another size.

@@ -1,7 +1,8 @@
 //! The shadow on the bottom of the box, so that what lies on it is seen to lie there and what flies is seen to fly.
 //!
-//! The light comes from straight above, and from a wide part of the sky: the shadow of what is low is dark and has a sharp
-//! border, that of what is high is pale and wide. A map keeps the lowest thing over each of its cells.
+//! The light comes from straight above, and from a wide part of the sky: the shadow of a low thing is dark
+//! and has a sharp border, that of a high thing is pale and wide. A map keeps the lowest thing over each of
+//! its cells.
 //!
 //! Invariant: the lowest of several heights does not depend on their order.
 
@@ -13,10 +14,11 @@ use crate::geom::Aabb;
 
 /// Cells of the map along the longer side of the floor.
 const CELLS: f64 = 192.0;
-/// Heights from which on a thing casts no shadow, over the diagonal of the box; how dark the shadow of one on the floor is;
-/// and how far it is blurred, over the diagonal of the box.
+/// Height above which a thing casts no shadow, over the diagonal of the box; how dark the shadow of one on
+/// the floor is; and how far it is blurred, over the diagonal of the box.
 const SHADOWS: [(f64, f32, f64); 2] = [(0.03, 0.30, 0.006), (0.45, 0.24, 0.03)];
-/// By how much nearness may differ from that of the floor, as a part of it. The floor is drawn by twice this behind itself.
+/// By how much nearness may differ from that of the floor, as a part of it. The floor is drawn by twice this
+/// behind itself.
 const SLACK: f64 = 0.5e-4;
 
 /// The floor, and how low things are over it.
@@ -145,7 +147,8 @@ impl Floor {
         light
     }
 
-    /// The means over squares that reach so many cells from their middle. Beyond the floor there is no shadow.
+    /// The means over squares that reach the given number of cells from their middle. Beyond the floor there
+    /// is no shadow.
     fn blurred(&self, values: &[f32], reach: usize) -> Vec<f32> {
         let width = self.columns;
         let mut across = vec![0.0; values.len()];

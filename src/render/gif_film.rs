@@ -28,8 +28,9 @@ pub struct Palette {
 impl Palette {
     /// The colours that suit some pictures of a film. White is always exact.
     ///
-    /// Colours are parted where they differ most until there are as many parts as a palette holds. A colour counts by the
-    /// root of its pixels, so that a few fast particles among much paper have their own.
+    /// Colours are parted where they differ most until there are as many parts as a palette holds. A colour
+    /// is weighted with the root of its number of pixels, so that a few fast particles among much paper have
+    /// their own.
     pub fn of(pictures: &[&Image]) -> Self {
         let mut cells = vec![([0_u64; 3], 0_u64); 1 << (3 * BITS)];
         for pixel in pictures.iter().flat_map(|picture| picture.pixels.chunks_exact(3)) {
@@ -68,7 +69,8 @@ struct Shade {
 /// Colours that share one of the palette.
 struct Group {
     shades: Vec<Shade>,
-    /// The channel in which they differ most, their mean in it, and the weighted sum of the squares of their differences.
+    /// The channel in which they differ most, their mean in it, and the weighted sum of the squares of their
+    /// differences.
     channel: usize,
     mean: f64,
     spread: f64,

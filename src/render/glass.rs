@@ -3,7 +3,8 @@
 //! A pixel keeps the nearest and the farthest of the clear triangles that its ray meets: the front and the back of a
 //! thing. What lies between them, such as the inner sides of a thick wall, would darken the picture and show nothing.
 //!
-//! Invariant: sheets are blended from far to near, and equal ones in their order, so the order of triangles does not matter.
+//! Invariant: sheets are blended from far to near, and equal ones in their order, so the order of triangles
+//! does not matter.
 
 use super::{
     raster::{Band, Corner, Frame},

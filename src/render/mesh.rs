@@ -21,8 +21,8 @@ pub struct MeshView<'a> {
     pub normals: &'a [DVec3],
     /// Three indices of vertices for each triangle. Both sides are drawn.
     pub triangles: &'a [[u32; 3]],
-    /// Values that choose the colours, one for each vertex, in the unit of the [`Scale`]. If there are fewer, the mesh has the
-    /// colour of its material.
+    /// Values that choose the colours, one for each vertex, in the unit of the [`Scale`]. If there are fewer,
+    /// the mesh has the colour of its material.
     pub values: &'a [f64],
     /// The plane that cuts the mesh open, which must then be closed. Clear meshes are cut without a face.
     pub cut: Option<Cut>,

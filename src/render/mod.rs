@@ -5,8 +5,8 @@
 //!                                                                       └──Apng, Gif──▶ a film
 //! ```
 //!
-//! What is clear is blended over what is opaque (`glass`); then folds are darkened by the depth of the picture (`occlusion`),
-//! and the floor by what is over it (`floor`).
+//! Clear things are blended over opaque ones (`glass`). Then folds are darkened by the depth of the picture
+//! (`occlusion`), and the floor by the things over it (`floor`).
 //!
 //! Everything is drawn on the processor at twice the size and averaged down. Rows are cut into bands of fixed
 //! height, which are drawn in parallel. Within a band the order is fixed, so ties in depth are settled alike

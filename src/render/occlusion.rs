@@ -1,9 +1,10 @@
 //! Soft darkness in folds, corners and under things, found from the depth of the picture alone.
 //!
-//! A ball around each point of the picture is filled in part by what lies in front of that point. Loos and Sloan
-//! ("Volumetric Obscurance", 2010) measure that part along some lines through the ball, in the direction of the view, and
-//! take the lines in pairs on opposite sides of the point. Nearness is linear over the picture on every plane, so both
-//! lines of a pair together are half full on a plane, however it is turned: planes stay as bright as they are.
+//! A ball around each point of the picture is filled in part by what lies in front of that point. Loos and
+//! Sloan ("Volumetric Obscurance", 2010) measure that part along some lines through the ball, in the
+//! direction of the view, and take the lines in pairs on opposite sides of the point. Nearness is linear over
+//! the picture on every plane, so both lines of a pair together are half full on a plane, however it is
+//! turned: planes stay as bright as they are.
 //!
 //! Invariant: the same lines are taken at every pixel and nothing is random, so pictures have the same bits every time.
 
@@ -34,8 +35,8 @@ struct Line {
     /// The place of one of them in the picture, from the point.
     columns: isize,
     rows: isize,
-    /// Half the length of a line within the ball, times two, over the square of nearness: a difference of nearness over this
-    /// and over the square of nearness is the part of the line by which it changes.
+    /// Half the length of a line within the ball, times two, over the square of nearness: a difference of
+    /// nearness over this and over the square of nearness is the part of the line by which it changes.
     length: f32,
     weight: f32,
 }
@@ -52,15 +53,15 @@ impl Balls {
             let half = (1.0 - part * part).sqrt();
             Line { columns: at(cos), rows: at(sin), length: (radius * half) as f32, weight: half as f32 }
         };
-        // in small pictures lines may fall on the point itself, and tell nothing there
+        // in small pictures lines may fall on the point itself, and say nothing there
         let lines: Vec<Line> =
             (0..LINES).map(line).filter(|line| (line.columns, line.rows) != (0, 0)).collect();
         let reach = lines.iter().map(|line| line.columns.unsigned_abs().max(line.rows.unsigned_abs()));
         Self { reach: reach.max().unwrap_or(0), lines }
     }
 
-    /// Finds how bright the pixels of a picture are, 0 … 1. Nearness 0 is the paper, which stays bright. `padded` is memory
-    /// for it.
+    /// Finds how bright the pixels of a picture are, 0 … 1. Nearness 0 is the paper, which stays bright.
+    /// `padded` is memory for it.
     pub fn light(&self, nearness: &[f32], width: usize, padded: &mut Vec<f32>, light: &mut Vec<f32>) {
         light.clear();
         light.resize(nearness.len(), 1.0);
@@ -96,7 +97,7 @@ impl Balls {
             for i in 0..RUN {
                 let a = (one[i] - points[i]) * (scale[i] * inverse);
                 let b = (other[i] - points[i]) * (scale[i] * inverse);
-                // what is far in front of the ball is not in it, and tells nothing of what is behind
+                // what is far in front of the ball is not in it, and says nothing about what is behind
                 let far = a.max(b);
                 let within = (2.0 - 0.5 * far).clamp(0.0, 1.0);
                 let both = 0.5 * (a.clamp(-1.0, 1.0) + b.clamp(-1.0, 1.0));
@@ -128,7 +129,8 @@ impl<'a> Padded<'a> {
         Self { nearness: padded, width: wide, border }
     }
 
-    /// The pixels of a row from x on, moved by so many columns and rows, which are at most the border.
+    /// The pixels of a row from x on, moved by the given numbers of columns and rows, which are at most the
+    /// border.
     fn run(&self, x: usize, y: usize, columns: isize, rows: isize) -> &[f32; RUN] {
         let row = (y + self.border).wrapping_add_signed(rows);
         let start = row * self.width + (x + self.border).wrapping_add_signed(columns);
@@ -145,7 +147,7 @@ mod tests {
     const PIXELS: f64 = 400.0;
     const FAR: f64 = 50.0;
 
-    /// The light in a picture of a surface that stands out by so many metres at (x, y), both in metres.
+    /// The light in a picture of a surface that stands out by `height` at (x, y), all in metres.
     fn light(height: impl Fn(f64, f64) -> Option<f64>) -> Vec<f32> {
         let near = |i: usize| {
             let at = |k: usize| (k as f64 + 0.5 - 0.5 * WIDTH as f64) / PIXELS;

@@ -149,7 +149,8 @@ pub fn bar(values: &Scale<'_>, scale: f64) -> Result<Layer, RenderError> {
 /// The height of the caption's layer, in units.
 pub const CAPTION_HEIGHT: f64 = 44.0;
 
-/// The time, the step and the number of particles where there are any, in columns that stay in place while the numbers change.
+/// The time, the step and the number of particles where there are any, in columns that stay in place while
+/// the numbers change.
 pub fn caption(moment: &Caption, particles: usize, scale: f64) -> Result<Layer, RenderError> {
     let mut words = vec![format!("t = {:.3} s", moment.time)];
     words.extend(moment.step.map(|step| format!("step {}", grouped(step))));

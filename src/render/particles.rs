@@ -85,7 +85,8 @@ const TILE: usize = 16;
 /// Discs that are drawn before the first look at what hides others.
 const FIRST_LOOK: usize = 128;
 
-/// What hides discs in a band: the least nearness in each of its tiles when they were last looked at. Nearness only grows.
+/// The limits that hide discs in a band: the least nearness in each of its tiles when they were last looked
+/// at. Nearness only grows.
 struct Hidden {
     left: usize,
     farthest: Vec<f32>,
@@ -113,8 +114,8 @@ impl Hidden {
     }
 }
 
-/// Puts into `found` the discs that may reach each band, near ones first: most of the others are then hidden and need no
-/// shading. Equally near ones keep their order. `order` is memory for it.
+/// Puts into `found` the discs that may reach each band, near ones first: most of the others are then hidden
+/// and need no shading. Equally near ones keep their order. `order` is memory for it.
 pub(super) fn by_band(
     discs: &[Option<Disc>],
     bands: usize,

@@ -1,8 +1,8 @@
 //! Obstacles that are cut open, so that the fluid behind them is seen.
 //!
-//! A ray from the eye that has entered a closed mesh more often than it has left it, before it meets the plane of the cut,
-//! comes out of the inside there: it shows the face that the cut has opened. So no triangle is divided, and the face is as
-//! sharp as the picture.
+//! A ray from the eye that has entered a closed mesh more often than it has left it, before it meets the
+//! plane of the cut, comes out of the inside there: it shows the face that the cut has opened. So no triangle
+//! is divided, and the face is as sharp as the picture.
 //!
 //! Invariant: neighbouring triangles share an edge without gap or overlap, so the count is exact for closed meshes.
 

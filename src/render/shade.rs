@@ -59,8 +59,8 @@ pub fn solid(material: Material, tint: Option<[f32; 3]>, normal: [f32; 3]) -> Rg
     }
 }
 
-/// The colour and the opacity of a point of a clear surface. Clear things hide more of what is behind them where they are
-/// seen at a flat angle: their outline shows, and their middle does not.
+/// The colour and the opacity of a point of a clear surface. Clear things hide more of what is behind them
+/// where they are seen at a flat angle: their outline shows, and their middle does not.
 pub fn veil(material: Material, tint: Option<[f32; 3]>, normal: [f32; 3]) -> Veil {
     let flat = 1.0 - normal[2].clamp(0.0, 1.0);
     let (least, rim) = match material {
@@ -89,7 +89,8 @@ fn stone(colour: [f32; 3], normal: [f32; 3]) -> Rgb {
     colour.map(|channel| byte(channel * light + gleam))
 }
 
-/// The colour of a face that a cut has opened. It is flat, so nobody takes it for a surface of the obstacle.
+/// The colour of a face that a cut has opened. It is flat, so that it does not look like a surface of the
+/// obstacle.
 pub fn section(material: Material, normal: [f32; 3]) -> Rgb {
     let light = 0.78 + 0.22 * dot(normal, LAMP).max(0.0);
     let colour = match material {

@@ -1,5 +1,5 @@
-//! Memory that pictures take turns in. What is large and new is cleared by the system page by page, which costs as much as
-//! drawing in it does.
+//! Memory that pictures reuse. The system clears large new memory page by page, which costs as much as
+//! drawing into it.
 //!
 //! Invariant: what a picture finds in it does not show: every part is written before it is read.
 

@@ -1,11 +1,11 @@
 //! The colours of ω: bands between round levels, orange inside and blue outside.
 //!
 //! Levels that shrink by decades keep detail near the surface. Values far from it, often a hundred times
-//! larger, share the outermost bands and do not wash the picture out. Where that would leave most of a side in one band, as
-//! in a solid that is thick everywhere, the levels are evenly spaced instead. Each side has its own largest level
-//! because ω is not a distance: an obstacle may reach +0.2 where its surroundings reach −20. Both ramps
-//! darken away from the surface and differ only in hue, so colour-blind people can read the plot too. The
-//! pale ends stay apart on paper because the line ω = 0 lies between them.
+//! larger, share the outermost bands and do not wash the picture out. Where that would leave most of a side
+//! in one band, as in a solid that is thick everywhere, the levels are evenly spaced instead. Each side has
+//! its own largest level because ω is not a distance: an obstacle may reach +0.2 where its surroundings reach
+//! −20. Both ramps darken away from the surface and differ only in hue, so colour-blind people can read the
+//! plot too. The pale ends stay apart on paper because the line ω = 0 lies between them.
 
 use super::{Samples, numbers::Decimal};
 
@@ -33,8 +33,8 @@ pub struct Scale {
 }
 
 impl Scale {
-    /// The levels that suit a slice. On each side they are a series 1, 2, 5 · 10ⁿ or evenly spaced, whichever divides the
-    /// samples better, and reach up to the 98th percentile of |ω| there.
+    /// The levels that suit a slice. On each side they are a series 1, 2, 5 · 10ⁿ or evenly spaced, whichever
+    /// divides the samples better, and reach up to the 98th percentile of |ω| there.
     pub fn for_samples(samples: &Samples) -> Self {
         let side = |sign: f64| {
             let magnitudes = samples.omega.iter().map(|w| w * sign).filter(|w| *w > 0.0 && w.is_finite());

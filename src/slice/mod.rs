@@ -5,7 +5,7 @@
 //!                      └──────terminal──▶ characters
 //! ```
 //!
-//! Invariant: this module sees a [`Field`] and nothing of how it was made. It opens no file and queries no
+//! Invariant: this module sees a [`Field`], and not how it was made. It opens no file and queries no
 //! terminal. The same field gives the same bytes on any number of threads.
 
 mod arrows;

@@ -1,6 +1,6 @@
 //! The sections of several solids in one plane: each has its own colour and hatching, and a legend names them.
 //!
-//! Colours and directions of hatching both tell solids apart, so a print without colours can be read too.
+//! Colours and directions of hatching both distinguish solids, so a print without colours can be read too.
 
 use std::fmt::Write;
 
@@ -27,7 +27,8 @@ pub struct Cut<'a> {
 
 /// Colours that stay apart for colour-blind people (Okabe and Ito), without yellow, which paper swallows.
 const COLOURS: [&str; 6] = ["#d55e00", "#0072b2", "#009e73", "#cc79a7", "#56b4e9", "#6b6b6b"];
-/// Directions of the hatching, degrees. Their number and that of the colours have no common factor, so 30 solids differ.
+/// Directions of the hatching, degrees. Their number and that of the colours have no common factor, so 30
+/// solids differ.
 const ANGLES: [f64; 5] = [45.0, -45.0, 0.0, 90.0, 22.5];
 /// Room below the plot for its axis.
 const BELOW: f64 = 52.0;

@@ -17,7 +17,7 @@ const INSIDE: [char; 3] = ['+', '*', '#'];
 const SURFACE: char = '=';
 const NO_VALUE: char = '?';
 
-/// Draws a slice `columns` characters wide, 1000 at most. The number of rows is such that lengths look equal
+/// Draws a slice `columns` characters wide, at most 1000. The number of rows is such that lengths look equal
 /// both ways.
 ///
 /// # Errors

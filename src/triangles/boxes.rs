@@ -1,7 +1,8 @@
 //! Four boxes in single precision, each turned as the triangles in it lie.
 //!
-//! A patch of a surface is nearly flat. A box whose axes are along and across it is as thin as the patch is bent, so that
-//! few boxes come nearer to a point than the surface does; boxes along x, y and z are as thick as the patch is wide.
+//! A patch of a surface is nearly flat. A box whose axes are along and across it is as thin as the patch is
+//! bent, so that few boxes come nearer to a point than the surface does; boxes along x, y and z are as thick
+//! as the patch is wide.
 //!
 //! Bounds are rounded outwards, and [`View::limit`] makes up for what single precision loses at a point.
 
@@ -12,8 +13,8 @@ use crate::geom::Aabb;
 /// The boxes of a branch.
 pub const WIDTH: usize = 4;
 
-/// What rounding does to coordinates along the axes of a box, relative to the coordinates of the point, and to squares
-/// of distances: some units in the last place of single precision.
+/// The most that rounding changes coordinates along the axes of a box, relative to the coordinates of the
+/// point, and to squares of distances: some units in the last place of single precision.
 const ROUNDING: f64 = 1e-6;
 
 /// How much boxes grow before a ray meets them, relative to the size of the solid and the way to it, and what is the
@@ -150,8 +151,8 @@ impl Boxes {
     }
 }
 
-/// Axes of length 1 at right angles: across the triangles and along them, the longer way first. Those of the space if the
-/// normals point all ways.
+/// Axes of length 1 at right angles: across the triangles and along them, the longer way first. Those of the
+/// space if the normals point all ways.
 fn axes_of<I: Iterator<Item = [DVec3; 3]>>(triangles: impl Fn() -> I) -> [DVec3; 3] {
     let areas = || triangles().map(|[a, b, c]| (b - a).cross(c - a));
     let (sum, all) = areas().fold((DVec3::ZERO, 0.0), |(sum, all), area| (sum + area, all + area.length()));

@@ -1,5 +1,5 @@
-//! What a thread has just found: programs ask for ω and for the parts of ∇ω at the same point one after the other, and
-//! for points that lie beside each other.
+//! The last result of a thread, kept because programs ask for ω and for the parts of ∇ω at the same point one
+//! after the other, and for points beside each other.
 
 use std::cell::RefCell;
 
@@ -32,7 +32,7 @@ thread_local! {
     };
 }
 
-/// What was found at a point, or what `search` finds; it is told where the last search has found its triangle.
+/// What was found at a point, or what `search` finds; it receives the triangle of the last search as a hint.
 pub fn remembered(solid: u64, point: DVec3, search: impl FnOnce(Option<u32>) -> (Sample, u32)) -> Sample {
     MEMORY.with_borrow_mut(|memory| {
         let entry = &mut memory.entries[place(point)];

@@ -43,7 +43,7 @@ pub use surface::NotClosed;
 /// to the nearest point has lost its digits there.
 const ON_SURFACE: f64 = 1e-10;
 
-/// A pseudonormal tells the side of a point if the cosine of the angle between them is larger.
+/// A pseudonormal decides the side of a point if the cosine of the angle between them is larger.
 const CLEAR_COSINE: f64 = 1e-7;
 
 /// What rounding may add to a distance, relative to the coordinates.
@@ -114,7 +114,7 @@ impl TriangleSolid {
         let distance = nearest.square.sqrt();
         let (normal, is_clear) = self.surface.normal_at(triangle, nearest.feature);
         if let Feature::Face { above, .. } = nearest.feature {
-            // the plane tells more digits than the nearest point does
+            // the plane gives more digits than the nearest point does
             return Sample { value: -above, gradient: -normal };
         }
         let offset = p - nearest.point;
@@ -151,7 +151,7 @@ impl Table for TriangleSolid {
         })
     }
 
-    /// The distance changes by no more than the distance between two points.
+    /// The distance changes by at most the distance between two points.
     fn range(&self, over: &Aabb) -> Interval {
         let bounds = self.surface.bounds;
         let deepest = 0.5 * bounds.size().min_element();
@@ -168,9 +168,9 @@ impl Table for TriangleSolid {
         Interval { lo: value - reach - slack, hi: (value + reach).min(most) + slack }
     }
 
-    /// The way to the nearest point is along the normal of its triangle or, on an edge or at a corner, along a sum of the
-    /// normals there with positive weights. The triangles that are nearest to some point of the box are at most twice its
-    /// radius farther from its centre than the nearest one.
+    /// The way to the nearest point is along the normal of its triangle or, on an edge or at a corner, along
+    /// a sum of the normals there with positive weights. The triangles that are nearest to some point of the
+    /// box are at most twice its radius farther from its centre than the nearest one.
     fn slopes(&self, over: &Aabb) -> [Interval; 3] {
         let any = [Interval { lo: -LONGEST_SLOPE, hi: LONGEST_SLOPE }; 3];
         let (centre, radius) = (over.centre(), 0.5 * over.size().length());

@@ -8,7 +8,7 @@ const LEAST_HEIGHT: f64 = 1e-12;
 /// A part of a triangle. Edges are numbered by the corner that they start from.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Feature {
-    /// Its plane, whose unit normal this is, and how far above it the other point is.
+    /// Its plane, given by this unit normal, and how far above it the other point is.
     Face {
         normal: DVec3,
         above: f64,
@@ -43,7 +43,7 @@ impl Plane {
         (area > LEAST_HEIGHT * longest).then_some(Self { cross, area })
     }
 
-    /// Of length 1.
+    /// The normal, of length 1.
     #[inline]
     pub fn normal(self) -> DVec3 {
         self.cross / self.area

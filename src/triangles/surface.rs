@@ -9,7 +9,7 @@ use super::boxes::Space;
 use super::nearest::{Feature, Plane};
 use crate::geom::Aabb;
 
-/// So many holes are listed.
+/// Number of holes that are listed.
 pub const MOST_LISTED: usize = 4;
 
 /// The most triangles that are taken.
@@ -132,7 +132,7 @@ pub struct Surface {
     normals: Vec<Option<DVec3>>,
     /// For the edges of each triangle, the sum of both normals.
     edge_normals: Vec<[DVec3; 3]>,
-    /// Whether the sums at the edges and at the corners of a triangle tell the side of a point.
+    /// Whether the sums at the edges and at the corners of a triangle decide the side of a point.
     clear_edges: Vec<[bool; 3]>,
     corner_normals: Vec<DVec3>,
     clear_corners: Vec<bool>,
@@ -251,7 +251,8 @@ impl Surface {
         self.normals[triangle as usize].unwrap_or(DVec3::Z)
     }
 
-    /// The outward normal or pseudonormal of a part of a triangle, and whether it tells the side of a point.
+    /// The outward normal or pseudonormal of a part of a triangle, and whether it decides the side of a
+    /// point.
     pub fn normal_at(&self, triangle: u32, feature: Feature) -> (DVec3, bool) {
         let t = triangle as usize;
         match feature {

@@ -162,8 +162,8 @@ fn distances_and_signs_are_those_of_all_triangles() {
     }
 }
 
-/// The tree finds the triangle that a search through all of them finds, to the bit: for solids of any size, far from the
-/// origin, flat ones, and points near and far.
+/// The tree finds the triangle that a search through all of them finds, to the bit: for solids of any size,
+/// far from the origin, flat ones, and points near and far.
 #[test]
 fn the_tree_hides_no_triangle() {
     let mut random = Random(21);

@@ -21,7 +21,7 @@ const DEEPEST: usize = 64;
 /// Boxes with more triangles near them are too large for their normals to say much.
 const MOST_NORMALS: usize = 64;
 
-/// Triangles count as within a distance if they are farther by no more than this.
+/// Triangles count as within a distance if they exceed it by at most this.
 const SLACK: f64 = 1.0 + 1e-12;
 
 /// Where a ray begins on a triangle, relative to the size of the surface.
@@ -39,7 +39,7 @@ pub struct Tree {
     branches: Vec<Branch>,
     /// The triangles in the order of the leaves.
     pieces: Vec<Piece>,
-    /// Their corners, in the order in which the leaves come to them.
+    /// Their corners, in the order in which the leaves list them.
     places: Vec<DVec3>,
     root: Child,
 }
@@ -172,8 +172,9 @@ impl Tree {
         self.pieces[place as usize].triangle
     }
 
-    /// The place in the tree of the triangle that is nearest to a point, the first one of the surface if there are several,
-    /// and its nearest point. The search begins with the triangle at `last`, which decides nothing but its cost.
+    /// The place in the tree of the triangle that is nearest to a point, the first one of the surface if
+    /// there are several, and its nearest point. The search begins with the triangle at `last`, which decides
+    /// nothing but its cost.
     pub fn nearest(&self, surface: &Surface, p: DVec3, last: Option<u32>) -> (u32, Nearest) {
         let look = |place: usize| on_triangle(p, self.corners(&self.pieces[place]));
         let first = last.filter(|&place| (place as usize) < self.pieces.len()).unwrap_or(0);
@@ -223,8 +224,8 @@ impl Tree {
         (best.0 as u32, best.1)
     }
 
-    /// The least and the greatest components of the normals of all triangles within a distance of a point, and the sum of
-    /// the normals. `None` if there are many, or if one of them has no area.
+    /// The least and the greatest components of the normals of all triangles within a distance of a point,
+    /// and the sum of the normals. `None` if there are many, or if one of them has no area.
     pub fn normals_within(
         &self,
         surface: &Surface,
@@ -316,9 +317,9 @@ fn halves((first, members): Group<'_>) -> (Group<'_>, Group<'_>) {
     ((first, low), (first + middle, high))
 }
 
-/// Where a line passes a triangle: 1 if it leaves the solid there and −1 if it enters it, and how far along. The outer
-/// `None` if it meets an edge. Both triangles at an edge find the same numbers for it, of opposite signs, so that no line
-/// slips between them (Woop, Benthin and Wald 2013).
+/// Where a line passes a triangle: 1 if it leaves the solid there and −1 if it enters it, and how far along.
+/// The outer `None` if it meets an edge. Both triangles at an edge find the same numbers for it, of opposite
+/// signs, so that no line slips between them (Woop, Benthin and Wald 2013).
 fn crossing((from, direction): (DVec3, DVec3), corners: [DVec3; 3]) -> Option<Option<(i32, f64)>> {
     let [a, b, c] = corners.map(|corner| corner - from);
     let weights = [direction.dot(b.cross(c)), direction.dot(c.cross(a)), direction.dot(a.cross(b))];

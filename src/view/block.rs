@@ -49,7 +49,8 @@ pub struct FrameHead {
     /// The number of the fluid's surface at this time, in the order in which surfaces are given.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub surface: Option<usize>,
-    /// The number of the run that the frame belongs to; a page that is told of a new run forgets frames of older ones.
+    /// The number of the run that the frame belongs to; a page that hears of a new run forgets frames of
+    /// older ones.
     pub run: u64,
     /// How numbers follow from velocities; `None` if they are stated without.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -133,8 +134,8 @@ struct Head<'a, T> {
     rest: &'a T,
 }
 
-/// The block of a frame. If `before` has as many particles, numbers are differences from it: whoever reads the
-/// block must have it. Its ranges must be those of the head if the head has a [`Motion`].
+/// The block of a frame. If `before` has as many particles, numbers are differences from it: the reader of
+/// the block must have it. Its ranges must be those of the head if the head has a [`Motion`].
 pub fn pack_frame(head: &FrameHead, frame: &Frame, before: Option<&Frame>) -> Vec<u8> {
     let fits = |before: &&Frame| {
         before.sites.len() == frame.sites.len() && before.levels.len() == frame.levels.len()
@@ -201,8 +202,9 @@ struct MeshHead {
     run: u64,
 }
 
-/// The block of a mesh: positions and normals with 16 bits for each coordinate, then the corners of triangles. `time` is
-/// the instant at which what moves stands so, s, and `run` the number of the run that the mesh belongs to.
+/// The block of a mesh: positions and normals with 16 bits for each coordinate, then the corners of
+/// triangles. `time` is the instant at which what moves stands so, s, and `run` the number of the run that
+/// the mesh belongs to.
 pub fn pack_mesh(mesh: &Mesh, time: f64, run: u64) -> Vec<u8> {
     pack_parts(std::slice::from_ref(mesh), MeshRole::Solids, time, run)
 }

@@ -57,8 +57,8 @@ pub struct Sizes {
     pub meshes: u64,
 }
 
-/// Blocks that are written together have about this many bytes: browsers take milliseconds for each group, and runs may have
-/// very many small frames.
+/// Blocks that are written together have about this many bytes: browsers take milliseconds for each group,
+/// and runs may have very many small frames.
 const GROUP: usize = 1 << 18;
 
 impl<'a> Page<'a> {
@@ -91,7 +91,7 @@ impl<'a> Page<'a> {
         self.frames.write(self.out)
     }
 
-    /// Adds the block of a mesh that frames name from now on, as [`Page::frame`].
+    /// Adds the block of a mesh that later frames name, as [`Page::frame`] does.
     ///
     /// # Errors
     /// Those of the stream, and blocks of 4 GiB and more.

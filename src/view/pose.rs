@@ -6,7 +6,7 @@ use crate::geom::Placement;
 
 /// The motion without deformation that brings points to others, each to within a distance, m; `None` if there is none.
 ///
-/// Three points that lie far apart tell it, so it is as exact as they are.
+/// Three points that lie far apart determine it, so it is as exact as they are.
 pub fn pose(from: &[DVec3], to: &[DVec3], tolerance: f64) -> Option<Placement> {
     if from.len() != to.len() {
         return None;

@@ -33,7 +33,7 @@ pub struct Setting {
     pub gravity: Option<[f64; 3]>,
     /// The params that a live page may change.
     pub params: Vec<Param>,
-    /// Quantities over time; `None` if they are told apart from the rest.
+    /// Quantities over time; `None` if they are sent separately.
     pub plots: Option<Vec<Plot>>,
 }
 

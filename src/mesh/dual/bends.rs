@@ -1,11 +1,11 @@
 //! Vertices over tight bends of a smooth surface, found together.
 //!
-//! Hits whose normals differ by more than a few degrees show a crease or a tight bend. To seek a crease takes
-//! dozens of evaluations one after another, and on a wavy surface nearly all cells only bend. So all these
-//! vertices move onto the surface together first, and three signs say that the surface only bends there: its
-//! normal below the vertex lies between those of the hits that differ most, while beside a crease it would be
-//! one of them; beside the vertex it turns about as fast as it does on the way from hit to hit, while over a
-//! crease it would turn at once; and the vertex stays in its cell.
+//! Hits whose normals differ by more than a few degrees show a crease or a tight bend. The search for a
+//! crease takes dozens of evaluations one after another, and on a wavy surface nearly all cells only bend. So
+//! all these vertices move onto the surface together first, and three signs say that the surface only bends
+//! there: its normal below the vertex lies between those of the hits that differ most, while beside a crease
+//! it would be one of them; beside the vertex it turns about as fast as it does on the way from hit to hit,
+//! while over a crease it would turn at once; and the vertex stays in its cell.
 
 use glam::DVec3;
 
@@ -17,7 +17,7 @@ use crate::geom::Aabb;
 /// A vertex of a smooth surface that lies farther than this from its cell, in cells, is astray.
 pub(super) const ASTRAY: f64 = 0.05;
 
-/// Steps of Newton's method, at most.
+/// Maximum number of steps of Newton's method.
 const STEPS: usize = 6;
 
 /// A step that needs no other after it, in cells.
@@ -26,7 +26,7 @@ const LAST_STEP: f64 = 1e-9;
 /// The normals are compared this far beside a vertex, in cells.
 const BESIDE: f64 = 0.05;
 
-/// On a smooth surface the normal turns at most so many times as fast as it does on the mean from hit to hit.
+/// On a smooth surface the normal turns at most this many times as fast as on average from hit to hit.
 const FASTER: f64 = 3.0;
 
 /// Normals that differ by more than this (cosine) are not those of one bend that a cell can show.

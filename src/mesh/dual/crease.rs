@@ -21,7 +21,8 @@ const DISTANCES: [f64; 4] = [0.2, 0.02, 1e-3, 1e-6];
 /// Faces whose normals differ by less than this make no crease (the cosine of 2.5°).
 const SMOOTH: f64 = 0.999;
 
-/// The largest distance of the result from the surface, in sizes. What the last probe leaves is far below it.
+/// The largest distance of the result from the surface, in sizes. The error that the last probe leaves is far
+/// smaller.
 const RESIDUAL: f64 = 1e-9;
 
 /// The point of the crease of two faces nearest to `start`, or the corner of three. `None` if there is no

@@ -24,20 +24,21 @@ use crate::geom::Aabb;
 /// How often folded triangles are looked for and mended.
 const REPAIRS: usize = 4;
 
-/// Evaluations for mending where triangles are not to cross, as a share of those that found the surface, which were
-/// made many at a time, and the fewest.
+/// Evaluations for mending where triangles must not cross: as a share of those that found the surface, which
+/// were made many at a time, and the least number.
 const MENDING: f64 = 0.25;
 const LEAST_MENDING: u64 = 20_000;
 
-/// Evaluations for mending where nothing crosses, and the fewest. The examples need up to four times as many as found
-/// the surface; without an end a mesh of a surface with details everywhere would never be done.
+/// Evaluations for mending where nothing crosses: as a share, and the least number. The examples need up to
+/// four times as many as found the surface; without a limit, a mesh of a surface with details everywhere
+/// would never be done.
 const SHARP_MENDING: f64 = 8.0;
 const LEAST_SHARP_MENDING: u64 = 200_000;
 
-/// Rounds of moving cuts back, at most. The last one moves all back.
+/// Maximum number of rounds of moving cuts back. The last one moves all back.
 const UNDOINGS: usize = 16;
 
-/// How often some of them are tried on the surface again, at most.
+/// Greatest number of times that some of them are tried on the surface again.
 const RESTORINGS: usize = 10_000;
 
 /// A triangle that agrees less than this (cosine) with the surface at a corner is compared with others.
@@ -102,9 +103,9 @@ impl<'a> Draft<'a> {
         }
     }
 
-    /// Moves vertices that cut edges back to the middles of their edges where triangles cross, and then as many of
-    /// them as can be to the surface again. The vertices from `first` on cut the edges with the given ends; without
-    /// them nothing crosses.
+    /// Moves vertices that cut edges back to the middles of their edges where triangles cross, and then
+    /// returns as many of them as possible to the surface. The vertices with indices from `first` cut the
+    /// edges with the given ends; without them nothing crosses.
     fn uncross(&mut self, first: usize, ends: &[[u32; 2]]) {
         let mut is_back = vec![false; ends.len()];
         let mut suspects = self.doubtful();
@@ -154,8 +155,8 @@ impl<'a> Draft<'a> {
         self.restore(&cuts);
     }
 
-    /// Moves vertices to where they were, as far as no triangle beside them crosses another then: all at once if that
-    /// can be, and else each half of them.
+    /// Moves vertices to where they were, unless a triangle beside them would then cross another: all at once
+    /// if that is possible, and otherwise each half of them.
     fn restore(&mut self, cuts: &BTreeMap<u32, Vertex>) {
         let mut beside: FxHashMap<u32, SmallVec<[u32; 8]>> = FxHashMap::default();
         let mut touched = Vec::new();
@@ -196,8 +197,8 @@ impl<'a> Draft<'a> {
         }
     }
 
-    /// The triangles that are not surely clear of others, ascending: they have a doubtful corner, or do not face as
-    /// the surface does at all of their corners.
+    /// The triangles that may cross others, ascending: they have a doubtful corner, or at some corner do not
+    /// face as the surface does.
     fn doubtful(&self) -> Vec<u32> {
         let Vertices { positions, normals, doubtful, .. } = &self.vertices;
         let is_doubtful = |t: &[u32; 3]| {

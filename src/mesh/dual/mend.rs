@@ -28,7 +28,7 @@ const LEFT: f64 = 0.9;
 const SHORTEST: f64 = 0.1;
 
 /// The most edges that are looked at: for each edge in the queue at first, and in all, which takes a second.
-/// Few are looked at so often unless the grid resolves nothing.
+/// Few edges are looked at that often unless the grid resolves nothing.
 const LOOKS: usize = 40;
 const MOST: usize = 20_000;
 
@@ -81,7 +81,7 @@ enum Change {
     Move(u32, Vertex),
 }
 
-/// The change that helps most so far, with its gain: how much less is wrong after it.
+/// The change that helps most so far, with its gain: by how much it lowers the measure of what is wrong.
 struct Choice(Option<(f64, Change)>);
 
 impl Choice {
@@ -245,7 +245,7 @@ fn places(patch: &mut Patch<'_>, v: u32, may_merge: bool) -> Vec<Vertex> {
 /// Triangles in a batch.
 const BATCH: usize = 2048;
 
-/// Triangles whose normals agree less than this with the surface below them (cosine) are looked at once more.
+/// Triangles whose normals agree less than this with the surface below them (cosine) are looked at again.
 const DOUBT: f64 = 0.8;
 
 /// Edges of triangles that lie upside down, ascending, and the number of evaluations. Only triangles with

@@ -7,11 +7,11 @@
 //! 2. [`place`](fn@place): a vertex for each loop, by `place`, `sharp`, `qef` and `crease`.
 //! 3. [`join`]: triangles. `quads` joins the four vertices around each hit and cuts the quad in two.
 //! 4. `refine`: edges that are still too far from the surface are cut.
-//! 5. `mend`: what stays far off or lies upside down is looked at one by one.
+//! 5. `mend`: edges that stay far off and triangles that lie upside down are treated one by one.
 //!
-//! If many triangles cross after stage 3 or 4, or any in the end, what follows stage 3 is done with care: `secure` makes
-//! fans of quads that cross, in stage 4 cuts move back to the middles of their edges where triangles would cross, and
-//! stage 5 changes nothing that would make them cross, as far as a budget allows.
+//! If many triangles cross after stage 3 or 4, or any in the end, what follows stage 3 is done with care:
+//! `secure` makes fans of quads that cross, in stage 4 cuts move back to the middles of their edges where
+//! triangles would cross, and stage 5 changes nothing that would make them cross, as far as a budget allows.
 //!
 //! The vertices are those of the dual of the marching-cubes mesh (Schaefer, Ju, Warren: Manifold dual
 //! contouring, IEEE TVCG 13, 2007), so the topology is that of marching cubes. The quadratic error is that of
@@ -60,9 +60,9 @@ use crate::field::Field;
 /// lies inside.
 ///
 /// Inside is strictly ω > 0. Everything outside the grid counts as outside, so a solid cut by the border is
-/// closed by faces on it (see [`Mesh::caps`]). `watch` is told the share of the
-/// surface found, and may end the work. Sources: Ju, Losasso, Schaefer, Warren, SIGGRAPH
-/// 2002; Schaefer, Ju, Warren, IEEE TVCG 13, 2007.
+/// closed by faces on it (see [`Mesh::caps`]). `watch` receives the share of the surface that is found, and
+/// may end the work. Sources: Ju, Losasso, Schaefer, Warren, SIGGRAPH 2002; Schaefer, Ju, Warren, IEEE TVCG
+/// 13, 2007.
 ///
 /// # Errors
 /// [`MeshError::NotANumber`] if ω is NaN at a node or on an edge that crosses the surface,
@@ -117,8 +117,8 @@ enum Attempt<'a> {
     Clear(Mesh),
     /// It does.
     Crossing {
-        /// The mesh before it was mended, and its edges that are far from the surface, if it was clear before edges were
-        /// cut, and triangles crossed then.
+        /// The mesh before it was mended, and its edges that are far from the surface, if it was clear before
+        /// edges were cut, and triangles crossed then.
         cut: Option<(Draft<'a>, Vec<[u32; 2]>)>,
         work: Work,
     },
@@ -162,19 +162,21 @@ fn apart(mut draft: Draft<'_>, far: Vec<[u32; 2]>, watch: &dyn Watch) -> Result<
     Ok(draft.finish())
 }
 
-/// So many pairs of triangles may cross before edges are cut or after it, and mending is tried. In the examples at 32 and
-/// 96 cells it parted all of at most 4 before and at most 44 after it, and never more than 48 after it; the 156 to 957 of
-/// a thousand joined parts before it were never parted. Between these numbers the choice costs time, and no quality.
+/// Mending is tried if at most this many pairs of triangles cross, before edges are cut or after it. In the
+/// examples at 32 and 96 cells mending parted all pairs where there were at most 4 before or at most 44 after
+/// cutting, and never more than 48 after it. The 156 to 957 pairs of a thousand joined parts before cutting
+/// were never parted. Between these numbers, the choice affects time only, not quality.
 const MENDABLE: usize = 100;
 
-/// With fewer edges to mend than one for so many triangles, mending takes less time than to look for crossings before it.
+/// If fewer than one edge in this many triangles needs mending, mending takes less time than looking for
+/// crossings before it.
 const CHECKED: usize = 5000;
 
 /// What a mesh is made for. Few meshes cross themselves, and care against that costs sharpness and time, so it is
 /// taken only where a mesh without it does.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Care {
-    /// As near to the surface as can be.
+    /// Vertices are as close to the surface as possible.
     Sharp,
     /// Without triangles that cross, though rims may become blunt and vertices leave the surface.
     Apart,

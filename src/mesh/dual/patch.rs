@@ -17,8 +17,9 @@ use crate::geom::Aabb;
 /// more so the less they agree.
 pub(super) const FACING: f64 = 0.3;
 
-/// Steps of Newton's method at most from the middle of a triangle to the surface below, and the step in cells
-/// that needs no other after it. Only the direction of the surface is sought, not its exact position.
+/// Maximum number of steps of Newton's method from the middle of a triangle to the surface below, and the
+/// step, in cells, after which no other is needed. Only the direction of the surface is sought, not its exact
+/// position.
 pub(super) const STEPS: usize = 4;
 pub(super) const NEAR: f64 = 0.01;
 
@@ -274,7 +275,8 @@ impl<'a> Patch<'a> {
         (distance, fold)
     }
 
-    /// The approximate distance of a point from the surface, a cell at most: the length of [`Self::step`].
+    /// The approximate distance of a point from the surface, and not more than a cell: the length of
+    /// [`Self::step`].
     pub fn distance(&mut self, p: DVec3) -> f64 {
         self.count += 1;
         let (omega, gradient) = self.field.omega_grad(p);
@@ -282,7 +284,7 @@ impl<'a> Patch<'a> {
         if distance.is_finite() { f64::min(distance, self.size) } else { 0.0 }
     }
 
-    /// The step of Newton's method at a point, a cell long at most, and the outward normal there.
+    /// The step of Newton's method at a point, at most a cell long, and the outward normal there.
     pub fn step(&mut self, p: DVec3) -> (DVec3, Option<DVec3>) {
         self.count += 1;
         let (omega, gradient) = self.field.omega_grad(p);

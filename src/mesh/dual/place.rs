@@ -32,10 +32,10 @@ use crate::geom::Aabb;
 /// Hits whose normals all lie within this of their mean (the cosine of 10°) belong to a smooth surface.
 const NEARLY_FLAT: f64 = 0.985;
 
-/// Newton steps onto a smooth surface, at most.
+/// Maximum number of Newton steps onto a smooth surface.
 const STEPS: usize = 4;
 
-/// The step of Newton's method onto a smooth surface that needs no other after it, in cells. It leaves its
+/// The step of Newton's method onto a smooth surface, in cells, after which no other is needed. It leaves its
 /// square times the curvature per cell, which is below 1/3 in a cell with normals within [`NEARLY_FLAT`].
 const LAST_STEP: f64 = 3e-6;
 
@@ -268,7 +268,7 @@ impl Placement<'_> {
         for (of, bend) in unsmooth.iter().zip(bends) {
             match bend.and_then(|_| settled.next()).flatten() {
                 Some(bends::Settled { position, normal }) => {
-                    // no way back: with it, meshes of gyroids crossed themselves more often
+                    // no fallback: with it, meshes of gyroids crossed themselves more often
                     output.slots.set(of.place, Vertex { position, normal, kind: VertexKind::Smooth });
                 }
                 None => self.move_to_crease(of, output),

@@ -9,7 +9,7 @@ use glam::DVec3;
 use super::super::normals::unit;
 use crate::field::Field;
 
-/// Newton steps at most: twice as many as a smooth surface takes.
+/// Maximum number of Newton steps: twice as many as a smooth surface takes.
 const STEPS: usize = 8;
 
 /// A step this small, in sizes, ends the search, because the next one would be below rounding.
@@ -21,7 +21,7 @@ pub(super) const SAME_FACE: f64 = 0.8;
 /// The first step along a line, in sizes. Each next step is twice as long.
 const FIRST_STEP: f64 = 1.0 / 64.0;
 
-/// Steps of the bracketed search at most. Bisection alone would need fewer.
+/// Maximum number of steps of the bracketed search. Bisection alone would need fewer.
 const BRACKETED: usize = 80;
 
 /// A point of the surface and the face that it lies on.
@@ -33,8 +33,8 @@ pub(super) struct FacePoint {
     pub normal: DVec3,
 }
 
-/// The surface by Newton's method, within `size` of `start`. `None` if it leads farther away or does
-/// not converge.
+/// A point of the surface within `size` of `start`, by Newton's method. `None` if it leads farther away or
+/// does not converge.
 pub(super) fn newton(field: &dyn Field, start: DVec3, size: f64, count: &mut u64) -> Option<FacePoint> {
     let mut at = start;
     for _ in 0..STEPS {

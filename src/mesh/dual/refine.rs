@@ -33,7 +33,7 @@ const BATCH: usize = 2048;
 const LONGEST_MOVE: f64 = 0.4;
 
 /// The longest drop of a middle onto a crease, in lengths of its edge. An edge that bridges a narrow groove
-/// drops to its bottom, and the triangles beside it come to lie on the walls.
+/// drops to its bottom, and the triangles beside it then lie on the walls.
 const LONGEST_DROP: f64 = 2.0;
 
 /// The face of an edge's end is looked up at this share of the edge's length from the end.
@@ -277,7 +277,7 @@ impl Bend {
     }
 }
 
-/// Steps of Newton's method on bends, at most.
+/// Maximum number of steps of Newton's method on bends.
 const STEPS: usize = 6;
 
 /// Moves bends onto the surface, all together. Returns for each whether it settled.

@@ -10,9 +10,10 @@
 //! All other quads are compared with the triangles near them. Where some cross, the vertices of their cells
 //! retreat: into their cells first, then to the mean of their hits. Their quads become fans around the hits,
 //! and sides are bent so that they pass through the faces between cells. Each triangle then lies in one cell,
-//! and those of a cell are a cone over a closed curve on its faces. Wherever the tip of the cone is in the cell, it does
-//! not cross itself, so that tips and bends are put on the surface; where sheets share a cell and cross, they go back.
-//! The vertices at the ends of a tunnel go back together, to where they began in their cell.
+//! and those of a cell are a cone over a closed curve on its faces. Wherever the tip of the cone is in the
+//! cell, it does not cross itself, so that tips and bends are put on the surface; where sheets share a cell
+//! and cross, they go back. The vertices at the ends of a tunnel go back together, to where they began in
+//! their cell.
 //!
 //! Invariant: retreats change no topology, and they spread until nothing crosses.
 
@@ -28,10 +29,10 @@ use super::vertices::{Vertex, VertexKind, Vertices};
 use crate::field::Field;
 use crate::geom::Aabb;
 
-/// Rounds of retreats at most. From the third on they spread to the cells around.
+/// Maximum number of rounds of retreats. From the third on they spread to the cells around.
 const ROUNDS: usize = 8;
 
-/// In so many rounds vertices in retreat, and the bends of sides, are put on the surface.
+/// Number of rounds in which vertices in retreat, and the bends of sides, are projected onto the surface.
 const SETTLING: usize = 4;
 
 /// Vertices in retreat keep this distance from the faces of their cells, in cells.
@@ -112,7 +113,7 @@ pub(super) fn as_joined(
     assemble(quads, cut, vertices, tubes, &[]).0
 }
 
-/// [`as_joined`], where the quads are not needed any more.
+/// [`as_joined`], if the quads are no longer needed.
 pub(super) fn into_joined(
     quads: &Quads<'_>,
     cut: Cut,
@@ -260,8 +261,8 @@ fn retreat(
     touched.iter().map(|quad| quad.hit).collect()
 }
 
-/// The cells of the marked vertices, and the sides that end in one: each side with the hits of the quads beside it, and the
-/// face between its cells.
+/// The cells of the marked vertices, and the sides that end in one: each side with the hits of the quads
+/// beside it, and the face between its cells.
 fn around(quads: &Quads<'_>, touched: &[Quad], is_marked: &[bool]) -> (BTreeMap<u32, Retreat>, Sides) {
     let mut sides = Sides::new();
     let mut cells: BTreeMap<u32, Retreat> = BTreeMap::new();

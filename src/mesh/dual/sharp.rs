@@ -33,7 +33,7 @@ const CORNER_REACH: f64 = 1e-9;
 /// cell, or from the cell's nearest point if it bends too much for that.
 const TRIES: usize = 4;
 
-/// Newton steps at most: twice as many as a smooth surface takes.
+/// Maximum number of Newton steps: twice as many as a smooth surface takes.
 const STEPS: usize = 8;
 
 /// A point nearer to the surface than this, in cells, is on it. Plane faces give 1e-15.

@@ -1,7 +1,7 @@
 //! Meshes as files: one file of this folder for each format, and the table of all formats.
 //!
-//! Coordinates are in metres, or in another unit where a format leaves the unit open. z points up, and triangles run counter-clockwise as seen from the fluid. Normals
-//! are written where the format has them.
+//! Coordinates are in metres, or in another unit where a format leaves the unit open. z points up, and
+//! triangles run counter-clockwise as seen from the fluid. Normals are written where the format has them.
 //!
 //! The command line takes its help, its messages and its writers from [`FORMATS`]. A new format is a file
 //! here with a constant `FORMAT`, declared as a module and listed in the table.

@@ -1,9 +1,10 @@
 //! Wavefront OBJ, as text.
 //!
-//! Vertices are shared, so programs see a closed mesh; normals have numbers of their own, as the format provides and
-//! Blender and Assimp write them: that is what modellers, MeshLab and viewers of the web read. Programs with one normal for
-//! a vertex do something else at creases: VTK makes a point of each corner, trimesh one of each normal unless it is told
-//! `maintain_order`, and meshio refuses the file. PLY has one normal for a vertex, and is closed for all of them.
+//! Vertices are shared, so programs see a closed mesh; normals have numbers of their own, as the format
+//! provides and Blender and Assimp write them: that is what modellers, MeshLab and viewers of the web read.
+//! Programs with one normal for a vertex do something else at creases: VTK makes a point of each corner,
+//! trimesh one of each normal unless `maintain_order` is set, and meshio refuses the file. PLY has one normal
+//! for a vertex, and is closed for all of them.
 //!
 //! Invariant: every number is written with the fewest digits that read back to the same `f64`.
 

@@ -1,7 +1,7 @@
 //! Binary little-endian PLY with vertex normals.
 //!
 //! Positions are `double`, because vertices are exact and `float` would move them by 1e-7 of their size.
-//! Normals are `float`, because 1e-7 radians matter to nobody.
+//! Normals are `float`, because an error of 1e-7 radians does not matter.
 //!
 //! Invariant: indices are written as `int`, which more readers accept than `uint`. [`Mesh::MAX_VERTICES`]
 //! fits it.

@@ -21,7 +21,7 @@ pub const FORMAT: Format = Format {
     write_text: Some(write_ascii),
 };
 
-/// Writes a mesh as binary STL. Nothing in the file tells the unit.
+/// Writes a mesh as binary STL. The file does not state the unit.
 ///
 /// # Errors
 /// Those of the stream.

@@ -1,4 +1,4 @@
-//! 3MF, for printers: a zip archive with the triangles as XML, which tells their unit.
+//! 3MF, for printers: a zip archive with the triangles as XML, which states their unit.
 //!
 //! Invariant: every number is written with the fewest digits that read back to the same `f64`. Equal meshes
 //! give equal bytes, because the archive holds no date.

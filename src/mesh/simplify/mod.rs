@@ -10,9 +10,9 @@
 //!   each is listed with the triangle nearest to it, and the lists follow every contraction;
 //! - points spread over the new triangles are within the tolerance of the surface, by ω/|∇ω|.
 //!
-//! So the tolerance holds both ways as far as those samples show, and not only for each step as with quadrics
-//! alone. [`measure`](super::measure) checks it with other samples. Two sheets closer to one another than the
-//! tolerance may come to touch. Caps at the grid's border stay as they are.
+//! So the tolerance holds both ways as far as those samples show. With quadrics alone it would hold only for
+//! each step. [`measure`](super::measure) checks it with other samples. Two sheets closer to one another than
+//! the tolerance may come to touch. Caps at the grid's border stay as they are.
 //!
 //! Invariant: this runs on one thread and breaks ties by vertex numbers, so the same mesh and field give the
 //! same bits.
@@ -35,8 +35,8 @@ use crate::field::Field;
 use crate::geom::Aabb;
 use quadric::Quadric;
 
-/// Passes over all edges at most. What a first pass had to refuse may be possible once the neighbours
-/// are gone.
+/// Maximum number of passes over all edges. What a first pass had to refuse may be possible once the
+/// neighbours are gone.
 const PASSES: usize = 4;
 
 /// A pass that removes less than this part of the vertices is the last.

@@ -12,8 +12,8 @@ pub struct ThinCells {
     pub count: usize,
     /// The smallest box around all of them, in metres; empty if there are none.
     pub bounds: Aabb,
-    /// The least thickness that was found in them, in metres, of those that are no wedges if there are any; infinite if it
-    /// is not known or nothing hides.
+    /// The least thickness that was found in them, in metres; wedges count only if there is nothing else.
+    /// Infinite if it is not known or nothing hides.
     pub thickness: f64,
     /// A point of the surface where it is that thin, in metres; the origin if there is none.
     pub at: DVec3,
@@ -41,8 +41,8 @@ impl ThinCells {
     /// The result for cells that were not looked into.
     pub(super) const ENDED: Self = Self { ended: true, ..Self::NONE };
 
-    /// The number of cells along the longest side of a grid with which what hides would be two cells thick.
-    /// `None` if nothing hides but wedges, its thickness is not known, or no grid can be so fine.
+    /// The number of cells along the longest side of a grid in which the hidden parts would be two cells
+    /// thick. `None` if nothing hides but wedges, its thickness is not known, or no grid can be so fine.
     pub fn cells_needed(&self, grid: &Grid) -> Option<usize> {
         let needed = (2.0 * grid.bounds().size().max_element() / self.thickness).ceil();
         (self.count > 0 && !self.is_wedge && needed > 0.0 && needed <= Grid::MAX_CELLS as f64)
@@ -51,7 +51,7 @@ impl ThinCells {
 
     /// The cells of two parts of a grid.
     pub(super) fn and(self, other: Self) -> Self {
-        // a wall tells more than the edge of a wedge
+        // a wall says more than the edge of a wedge
         let before = |a: &Self, b: &Self| (a.is_wedge, a.thickness) < (b.is_wedge, b.thickness);
         let is_other = other.count > 0 && (self.count == 0 || before(&other, &self));
         let thinner = if is_other { other } else { self };

@@ -27,27 +27,28 @@ const PARALLEL: f64 = 0.9;
 /// Distances from a surface, in cells, at which ω must have both signs for one of them.
 const BESIDE: [f64; 3] = [1e-2, 1e-4, 1e-6];
 
-/// What outward rounding may leave of a slope that is zero.
+/// The most that outward rounding may leave of a slope that is zero.
 const NO_SLOPE: f64 = f64::MIN_POSITIVE;
 
-/// Steps of Newton's method onto a face at most.
+/// Maximum number of steps of Newton's method onto a face.
 const STEPS: usize = 8;
 
 /// A point nearer to a face than this, in cells, is on it.
 const ON_FACE: f64 = 1e-8;
 
-/// Faces that agree more than this (cosine) with each other's backs are those of a wall or a gap, and others those of a wedge
-/// of ten degrees or more.
+/// Faces that agree more than this (cosine) with each other's backs are those of a wall or a gap, and others
+/// those of a wedge of ten degrees or more.
 const WALL: f64 = 0.985;
 
 /// Faces that agree more than this (cosine) with each other's backs, at four degrees or less, are those of no wedge.
 const NARROWEST: f64 = 0.998;
 
-/// A wedge is followed so many times as far as plane faces need to be two cells thick, in so many steps.
+/// How far a wedge is followed, in units of the distance at which plane faces are two cells apart, and in how
+/// many steps.
 const FARTHER: f64 = 2.0;
 const STEPS_ALONG: u32 = 32;
 
-/// From step to step it grows at most so many times, counted from so thick in cells.
+/// Greatest growth from one step to the next, and the thickness, in cells, from which growth is counted.
 const GROWTH: f64 = 2.0;
 const GROWTH_OF_CELL: f64 = 0.5;
 
@@ -65,8 +66,8 @@ const BACK: f64 = 0.5;
 const THICKEST: f64 = 2.0;
 const STEPS_ACROSS: usize = 64;
 
-/// How far beyond the cell, in cells, a point of the surface counts as its own: what passes just between the nodes
-/// leaves next to nothing in the cell itself.
+/// How far beyond the cell, in cells, a point of the surface still counts as its own: a part that passes just
+/// between the nodes leaves next to nothing in the cell itself.
 const BESIDE_CELL: f64 = 1.0 / 16.0;
 
 /// Bisections of a step across. They leave a millionth of it.
@@ -415,8 +416,8 @@ impl Look<'_> {
         (normal.dot(face) > KNOWN).then_some(far)
     }
 
-    /// The way from a point of the surface to where it is met again from inside, or from outside, if the face there turns its
-    /// back. Infinite beyond two cells.
+    /// The way from a point of the surface to where it is met again from inside, or from outside, if the face
+    /// there turns its back. Infinite beyond two cells.
     fn across(&self, from: DVec3, way: DVec3, inside: bool) -> Across {
         let step = THICKEST * self.bounds.size().min_element() / STEPS_ACROSS as f64;
         let is_beyond = |t: f64| (self.omega(from + t * way) > 0.0) != inside;

@@ -10,8 +10,8 @@ use glam::DVec3;
 /// The endings of files that are read.
 pub const FORMATS: [&str; 3] = ["stl", "obj", "ply"];
 
-/// The corners of a file's triangles, in the order of the file; polygons are cut into triangles. The format is that of the
-/// name's ending.
+/// The corners of a file's triangles, in the order of the file; polygons are cut into triangles. The format
+/// is that of the name's ending.
 ///
 /// # Errors
 /// What is wrong with the file, in a few words.

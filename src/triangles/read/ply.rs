@@ -164,7 +164,7 @@ impl Numbers<'_> {
         })
     }
 
-    /// So many bytes, the lowest first.
+    /// The given number of bytes, the lowest first.
     fn bytes<const N: usize>(&mut self) -> Result<[u8; N], String> {
         let (taken, rest) = self.rest.split_first_chunk::<N>().ok_or("it ends too early")?;
         self.rest = rest;

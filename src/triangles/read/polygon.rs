@@ -8,9 +8,10 @@ const MOST_CORNERS: usize = 4000;
 /// Areas below this part of the square of a polygon's size are rounding of its corners.
 const ROUNDING: f64 = 1e-6;
 
-/// Cuts a polygon into triangles wound as it is, which have all of its corners: those that share the first corner or, where
-/// one of them would lie outside of it, as in a polygon with a notch, ears cut off one after the other. Corners need not lie
-/// exactly in one plane. A polygon without area, or whose outline crosses itself, is cut from its first corner.
+/// Cuts a polygon into triangles wound as it is, which have all of its corners: those that share the first
+/// corner or, where one of them would lie outside of it, as in a polygon with a notch, ears cut off one after
+/// the other. Corners need not lie exactly in one plane. A polygon without area, or whose outline crosses
+/// itself, is cut from its first corner.
 ///
 /// # Errors
 /// What is wrong with the polygon, in a few words.
@@ -54,8 +55,8 @@ fn around(left: &[usize], place: usize) -> [usize; 3] {
     [left[(place + n - 1) % n], left[place], left[(place + 1) % n]]
 }
 
-/// Whether the triangle at a corner lies inside what is left of the polygon, and touches none of its other corners. A corner
-/// within a side thus becomes one of a triangle, as it is of the polygon beside it.
+/// Whether the triangle at a corner lies inside what is left of the polygon, and touches none of its other
+/// corners. A corner within a side thus becomes one of a triangle, as it is of the polygon beside it.
 fn is_ear(flat: &[DVec2], left: &[usize], tip: usize) -> bool {
     let own = around(left, tip);
     let [a, b, c] = own.map(|corner| flat[corner]);
