@@ -27,7 +27,7 @@ pub struct Solid {
     pub(super) moment: Arc<Moment>,
 }
 
-/// What all clones of a solid share, at whatever time they are looked at.
+/// The data that all clones of a solid share, at whatever time they are looked at.
 pub(super) struct Inner {
     name: String,
     pub engine: Engine,
@@ -149,8 +149,8 @@ impl Solid {
         self.inner.omega.range.moves()
     }
 
-    /// Where the solid is at a time, s, seen from where it is at the time 0, if it moves without deformation; `None` if
-    /// that is not to be seen in its formula.
+    /// Where the solid is at a time, s, seen from where it is at the time 0, if it moves without deformation;
+    /// `None` if its formula does not show that.
     pub fn placement(&self, time: f64) -> Option<Placement> {
         self.rigid_motion()?.placement(time)
     }
@@ -225,7 +225,7 @@ impl Solid {
         &self.inner.applied
     }
 
-    /// What the programs of one kind need to know of the time.
+    /// What the programs of one kind need to know about the time.
     #[inline]
     fn uniforms(&self, kind: ProgramKind, programs: &Programs) -> &UniformValues {
         match &programs.uniforms {

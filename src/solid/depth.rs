@@ -9,7 +9,7 @@ use crate::field::{Field, GradientsMut, Points};
 /// positive inside, with minus the outward unit normal as its gradient.
 ///
 /// Exact near quadrics whatever the scales of the leaves, where ω only has the right sign; Newton's method on
-/// it is at the surface after a step or two.
+/// it reaches the surface after a step or two.
 ///
 /// ```
 /// use rfm::{Engine, Field, Program, glam::DVec3, solid::Depth};
@@ -22,7 +22,8 @@ use crate::field::{Field, GradientsMut, Points};
 /// ```
 pub struct Depth<'a>(pub &'a Solid);
 
-/// Points whose contacts are asked for at a time: the curvatures that nobody wants then lie on the stack.
+/// Points whose contacts are asked for at a time: the curvatures, which are not needed, then lie on the
+/// stack.
 const BATCH: usize = 256;
 
 impl Field for Depth<'_> {

@@ -102,7 +102,7 @@ impl Solid {
         }
     }
 
-    /// The contact that its program finds. Where no derivative tells anything its distance is 0.
+    /// The contact that its program finds. Where the derivatives say nothing, its distance is 0.
     pub(super) fn estimated_contact(&self, p: DVec3) -> Contact {
         let mut out = [0.0; 5];
         self.evaluate(ProgramKind::Contact, p.to_array(), &mut out);
@@ -112,9 +112,10 @@ impl Solid {
 
     /// The velocity of the solid near a point of its surface, in lengths per second. Zero for a solid at rest.
     ///
-    /// A solid that is moved and turned without deformation has the velocity v₀ + ω × p, also where its surface
-    /// moves within itself, as that of a turning cylinder does. Of other solids only the velocity along the normal of
-    /// the face which [`Solid::contact`] finds is in ω; solids of parts that move differently are among them.
+    /// A solid that is moved and turned without deformation has the velocity v₀ + ω × p, also where its
+    /// surface moves within itself, as that of a turning cylinder does. For other solids, ω holds only the
+    /// velocity along the normal of the face that [`Solid::contact`] finds. Solids whose parts move
+    /// differently are among them.
     pub fn wall_velocity(&self, p: DVec3) -> DVec3 {
         if !self.moves() {
             return DVec3::ZERO;
@@ -173,7 +174,7 @@ impl Solid {
     }
 
     /// An interval that contains ω of every point of a box: the exact value and the one that [`Solid::omega`]
-    /// gives, also where that overflows. [`Interval::ALL`] where ω may not be a number. It says nothing of
+    /// gives, also where that overflows. [`Interval::ALL`] where ω may not be a number. It does not cover
     /// points at which ω is NaN because of their coordinates: not finite, or so large that their sum is not.
     pub fn range(&self, over: &Aabb) -> Interval {
         self.inner.omega.range(self.inner.engine, over, &self.moment, false)

@@ -1,4 +1,4 @@
-//! A solid as a person may look at it: its leaves, and what is left of it in a box.
+//! A solid for people to look at: its leaves, and what is left of it in a box.
 
 use super::construction::Solid;
 use super::leaves::pruning::{Verdict, prune};
@@ -50,7 +50,7 @@ impl Solid {
         Some(nodes.iter().enumerate().map(info).collect())
     }
 
-    /// What a cell map would keep of the solid in this box; `None` if it cannot be taken apart.
+    /// The part of the solid that a cell map would keep in this box; `None` if it cannot be taken apart.
     pub fn remainder_in(&self, over: &Aabb) -> Option<Remainder> {
         let parts = self.parts()?;
         let mut words = Vec::new();

@@ -5,6 +5,7 @@
 //! | file or folder | what it holds |
 //! |---|---|
 //! | `construction`, `evaluation` | [`Solid`], its programs and its values |
+//! | `engine`, `moment` | machine code or the interpreter; a solid at a time, or during a stretch of time |
 //! | `nearest` | distances with proofs |
 //! | `twin`, `walls`, `surface`, `depth` | its views: sign, walls of a fluid, the cheapest field, depth |
 //! | `programs` | compiled code, the programs made on demand, programs over blocks of points |

@@ -10,8 +10,8 @@ use super::programs::ranges::UniformRanges;
 use crate::geom::Twist;
 use crate::interval::Interval;
 
-/// A stretch of time. Values are those at its end, ranges hold for all of it; a solid at rest has one for
-/// ever.
+/// A stretch of time. Values are those at its end, ranges hold for all of it; a solid at rest has a single
+/// one without end.
 pub(super) struct Moment {
     pub from: f64,
     pub to: f64,

@@ -30,7 +30,7 @@ pub struct Distance {
     pub nearest: DVec3,
 }
 
-/// What is asked for distances again and again: the solid and its complement, prepared for the search.
+/// A solid and its complement, prepared for many distance queries.
 pub struct Distances {
     solid: Solid,
     /// Where ω is positive, and where it is negative.
@@ -52,16 +52,17 @@ const MOST_CELLS: usize = 1_000;
 /// Work for one point, in the unit of `bounds::search`.
 const MOST_WORK: usize = 100_000;
 
-/// Rays get twice as long so many times.
+/// Number of times that the length of a ray is doubled.
 const DOUBLINGS: i32 = 60;
 
-/// If what is known is so many times farther than the middle of a cell, the corners of the cell are tried as well.
+/// If what is known is farther away than the middle of a cell by more than this factor, the corners of the
+/// cell are tried as well.
 const WIDE_GAP: f64 = 1.02;
 
 /// Places behind a cell that are tried.
 const BEHIND: u32 = 6;
 
-/// How far beyond a point with ω = 0 the other side is looked for, over its distance.
+/// Distance beyond a point with ω = 0 at which the other side is looked for, over the distance of the point.
 const BEYOND: f64 = 1e-9;
 
 /// Places that are tried where no ray meets the surface.
@@ -211,7 +212,8 @@ impl Best<'_> {
         way.is_finite() && self.solid.sign(q + way) * self.sign < 0.0
     }
 
-    /// Tries the middle of a cell, its corner that is nearest to the point, other corners, and what lies behind the cell.
+    /// Tries the middle of a cell, its corner that is nearest to the point, other corners, and what lies
+    /// behind the cell.
     fn try_cell(&mut self, cell: &Aabb) {
         let nearest = self.p.clamp(cell.min, cell.max);
         if self.is_other(nearest) {
@@ -238,8 +240,8 @@ impl Best<'_> {
         }
     }
 
-    /// Tries places that are evenly spread over a box. (Beside a jump of ω the nearest cells are such that nobody can tell
-    /// what they hold, and no cell that holds something is ever looked at.)
+    /// Tries places that are evenly spread over a box. (Beside a jump of ω the nearest cells cannot be
+    /// decided, and no cell that holds something is ever looked at.)
     fn scatter(&mut self, space: &Aabb) {
         // the additive recurrence in three dimensions, by the root of g⁴ = g + 1
         const G: f64 = 1.220_744_084_605_759_5;
@@ -250,8 +252,8 @@ impl Best<'_> {
         }
     }
 
-    /// Follows ω towards the other side, with steps that get longer: from the tip of a sharp edge into the solid, where a
-    /// cell around the tip has neither middle nor corners.
+    /// Follows ω towards the other side, with steps that get longer: from the tip of a sharp edge into the
+    /// solid, where a cell around the tip has neither middle nor corners.
     fn climb(&mut self, from: DVec3, first: f64) {
         let (mut q, mut step) = (from, first);
         for _ in 0..MOST_STEPS {
@@ -268,7 +270,8 @@ impl Best<'_> {
         }
     }
 
-    /// Turns the ray to the nearest point as long as that brings nearer ones: to the foot of a face, and along edges.
+    /// Turns the ray towards the nearest point as long as that finds nearer ones: to the foot of a face, and
+    /// along edges.
     fn turn(&mut self) {
         let mut angle = WIDEST_TURN;
         for _ in 0..MOST_ROUNDS {

@@ -11,7 +11,7 @@ const TWIN_SUFFICES: usize = 24;
 
 impl Solid {
     /// The cheapest field with exactly the sign, zero set and surface gradient of ω in a box: the twin for a
-    /// few leaves, a [`CellMap`] for many. Off the surface its value is another one.
+    /// few leaves, a [`CellMap`] for many. Off the surface its value differs.
     pub fn surface(&self, over: Aabb) -> Box<dyn Walls> {
         match if self.has_many_leaves() { CellMap::new(self, over) } else { None } {
             Some(map) => Box::new(map),
@@ -28,7 +28,8 @@ impl Solid {
         }
     }
 
-    /// Whether so many leaves decide the sign that it pays to find out which of them matter at a place.
+    /// Whether the number of leaves that decide the sign is so large that it pays to find out which of them
+    /// matter at a place.
     pub fn has_many_leaves(&self) -> bool {
         self.leaf_count().is_some_and(|leaves| leaves > TWIN_SUFFICES)
     }

@@ -27,7 +27,7 @@ pub struct ProgramVariant {
 }
 
 impl ProgramVariant {
-    /// What solids are compiled to when nothing is asked for.
+    /// The variant that solids have by default.
     pub const STANDARD: Self = Self::new(Precision::F64, Form::Stable, false);
 
     /// All variants from the cheapest to the dearest, in the order in which they are tried. The pawn's ω in
@@ -61,7 +61,7 @@ impl ProgramVariant {
 /// No program keeps the tolerance.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct OutOfTolerance {
-    /// The smallest certified |computed ω − exact ω| that can be had; infinite if there is none.
+    /// The smallest possible certified |computed ω − exact ω|; infinite if there is none.
     pub bound: f64,
     /// The program that has it.
     pub variant: ProgramVariant,

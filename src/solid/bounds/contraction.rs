@@ -25,10 +25,10 @@ const ROUNDS_OF_CELL: usize = 2;
 /// A round that leaves more than this of each side is the last one.
 const WORTH_ANOTHER: f64 = 0.8;
 
-/// Boxes larger than this are those of leaves that know too little by themselves.
+/// Boxes larger than this come from leaves that are too weak alone.
 const UNKNOWN_SIZE: f64 = 1e30;
 
-/// Rounds in which leaves tell each other their linear forms, the leaves that do, and the forms that are told.
+/// Rounds in which leaves exchange their linear forms, leaves that take part, and forms that are exchanged.
 const EXCHANGES: usize = 3;
 const MOST_EXCHANGING: usize = 16;
 const MOST_GIVEN: usize = 64;
@@ -89,8 +89,8 @@ impl Shrink for Tree {
 }
 
 impl Tree {
-    /// Walks over the tree until that no longer pays. With a point `from` it also tells how far from it all that
-    /// is left must be.
+    /// Walks over the tree until that no longer pays. With a point `from` it also returns the least distance
+    /// from there to all that is left.
     fn rounds(
         &self,
         known: &Remaining,
@@ -226,8 +226,8 @@ impl Pass<'_> {
         self.close(start, code, count, Contracted::Everywhere)
     }
 
-    /// Lets the leaves that are joined by "all of" know of each other's linear forms: a cone ends where its
-    /// base is, of which its mantle knows nothing. False if nothing is left of the box.
+    /// Shares the linear forms among the leaves that are joined by "all of": a cone ends at its base, which
+    /// its mantle does not know. False if nothing is left of the box.
     fn exchange(&mut self, first_form: usize, start: usize, space: &mut Aabb) -> bool {
         let leaves: Vec<(u32, bool)> = self.left[start + 1..]
             .iter()
@@ -290,7 +290,7 @@ impl Pass<'_> {
         self.close(start, code, count, Contracted::Nowhere)
     }
 
-    /// Ends a list of `count` members that are left. Without any its verdict is `neutral`.
+    /// Ends a list of `count` members that are left. If none is left, its verdict is `neutral`.
     fn close(&mut self, start: usize, code: u32, count: u32, neutral: Contracted) -> Contracted {
         match count {
             0 => {

@@ -10,8 +10,7 @@ pub enum Bounds {
     /// It is proven that the solid lies in this box. Each face is within a millionth of the longest side of
     /// the solid itself, where the budget of the search allowed it.
     Within(Aabb),
-    /// No such box was found; [`Solid::unbounded`](crate::Solid::unbounded) tells which operand has
-    /// none.
+    /// No such box was found; [`Solid::unbounded`](crate::Solid::unbounded) names the operand without bounds.
     Unbounded,
 }
 

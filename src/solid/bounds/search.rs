@@ -14,10 +14,11 @@ use crate::geom::Aabb;
 /// Half the side of the cube in which solids are looked for. Programs answer no signs farther out than 2²⁵⁶.
 pub const SEARCH_RADIUS: f64 = 1.809_251_394_333_065_6e75; // 2²⁵⁰
 
-/// What reaches so far has no end: bounds of linear programs over the whole region lie a little within it.
+/// A side that reaches this far has no end: bounds of linear programs over the whole region lie a little
+/// within it.
 const OPEN: f64 = SEARCH_RADIUS * 1e-12;
 
-/// Cells looked at for one side at most.
+/// Maximum number of cells looked at for one side.
 const CELLS_OF_SIDE: usize = 600;
 
 /// Work for one side, in the unit below: fewer cells of a large solid. It is some tenths of a second.
@@ -26,8 +27,9 @@ const WORK_OF_SIDE: usize = 200_000;
 /// Nodes of formulas that make a unit of work.
 pub const NODES_PER_WORK: usize = 16;
 
-/// How close to a point of the solid a side is moved, relative to the longest side, for the first so many cells.
-/// Most sides reach the first goal within 50 cells; those that touch a thin curved edge would need thousands.
+/// How close to a point of the solid a side is moved, relative to the longest side, for the given number of
+/// first cells. Most sides reach the first goal within 50 cells; those that touch a thin curved edge would
+/// need thousands.
 const GOALS: [(usize, f64); 4] = [(100, 1e-6), (200, 1e-5), (300, 1e-4), (CELLS_OF_SIDE, 1e-3)];
 
 /// How much a box is worth.
@@ -41,7 +43,8 @@ pub enum Effort {
     Point,
 }
 
-/// What makes a box smaller without losing a point of a solid, the better the smaller the box.
+/// Something that makes a box smaller without losing a point of a solid. It works the better, the smaller the
+/// box is.
 pub trait Shrink {
     /// What is known of a box, handed on to the boxes within it.
     type Known: Clone;

@@ -1,4 +1,4 @@
-//! Where a solid is that is too large to be taken apart: each junction once, whatever uses it.
+//! Bounds of a solid that is too large to be taken apart: each junction is visited once, whatever uses it.
 
 use crate::geom::Aabb;
 use crate::interval::Interval;
@@ -8,7 +8,8 @@ use crate::solid::construction::Solid;
 use super::search::{Effort, NODES_PER_WORK, SEARCH_RADIUS, Shrink};
 use glam::DVec3;
 
-/// Leaves that get a box of their own. Solids that cannot be taken apart have few: they use each often.
+/// Number of leaves that get a box of their own. Solids that cannot be taken apart have few leaves, and use
+/// each of them often.
 const MOST_LEAVES: usize = 50_000;
 
 /// Walks over all nodes that a cell takes: forwards, backwards and with slopes, for two halves and some points. A
@@ -97,7 +98,8 @@ struct Signs {
     negative: Aabb,
 }
 
-/// A box around the points where a root is positive, or negative, from the boxes of its leaves. `None` if there are none.
+/// A box around the points where a root is positive, or negative, from the boxes of its leaves. `None` if
+/// there are none.
 fn joined_boxes(graph: &Graph, root: Node, time: Interval, negated: bool) -> Option<Aabb> {
     let everywhere = Aabb::new(DVec3::splat(-SEARCH_RADIUS), DVec3::splat(SEARCH_RADIUS));
     let mut used = vec![false; root.index() + 1];

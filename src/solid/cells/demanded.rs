@@ -1,7 +1,7 @@
-//! What decides in and near the cells of a box, found out where somebody asks.
+//! The leaves that decide in and near the cells of a box, found on demand.
 //!
-//! Gradients off the surface are asked for in few places, and values that are continuous near the surface alone. So a
-//! cell is divided when a point in it is asked for, down to the cells of the flat grid.
+//! Gradients off the surface are needed in few places, and continuous values only near the surface. So a cell
+//! is divided when a point in it is asked for, down to the cells of the flat grid.
 //!
 //! Invariant: what a cell keeps depends on the cell alone, and not on what was asked before.
 

@@ -106,7 +106,7 @@ impl CellMap {
         }
     }
 
-    /// As `Leaves::decide`, at many points.
+    /// `Leaves::decide` for many points.
     fn decide_many(&self, words: &[u32], at: &mut usize, points: &Gathered, out: &mut Decided) {
         let word = words[*at];
         *at += 1;

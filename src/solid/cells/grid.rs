@@ -1,5 +1,5 @@
 //! The cells of a box, found level by level: a flat grid of 64³, and below it eight children for each cell
-//! that is divided further. What is asked of them is answered in [`window`](super::window).
+//! that is divided further. Questions about them are answered in [`window`](super::window).
 //!
 //! Each cell is judged with a margin: by the ranges of the leaves over the cell *grown* by it. A cell without
 //! a surface is then farther than the margin from every surface, and one near a surface keeps every leaf that
@@ -30,20 +30,21 @@ const FEW_LEAVES: usize = 4;
 /// The deepest level.
 pub(super) const MAX_DEPTH: u32 = 10;
 
-/// Below [`DEPTH`] a cell whose leaves have stayed the same for so many levels is left as it is: surfaces
-/// that lie on one another never part.
+/// Below [`DEPTH`], a cell whose leaves have stayed the same for this number of levels is left as it is:
+/// surfaces that lie on one another never part.
 const LEVELS_IN_VAIN: u32 = 2;
 
-/// Ranges of leaves asked for while a map is built, and with that the words that its cells hold, 4 bytes
-/// each. A level that would exceed it is not begun: the cells above it stay as they are. 10 000 balls need a
-/// third of it. What a moving solid may touch is divided later, where somebody asks, and does not count.
+/// Maximum number of ranges of leaves that are computed while a map is built, and so of the words that its
+/// cells hold, 4 bytes each. A level that would exceed it is not begun: the cells above it stay as they are.
+/// 10 000 balls need a third of it. Cells that a moving solid may touch are divided later, on demand, and do
+/// not count.
 const MOST_RANGES: usize = 1 << 24;
 
-/// Cells that a moving leaf may pass are left at this depth and divided anew for each window of time. Some
-/// eight of them lie side by side in what a paddle of a tenth of the box sweeps.
+/// Cells that a moving leaf may pass are left at this depth and divided again for each window of time. About
+/// eight of them lie side by side in the region that a paddle of a tenth of the box sweeps.
 pub(super) const RESTLESS_DEPTH: u32 = 4;
 
-/// What is known of a cell. In a word its last two bits say which, and the others where to go on.
+/// What is known of a cell. The last two bits of a word say which case it is, the other bits where to go on.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Cell {
     Fluid,
@@ -184,8 +185,8 @@ impl Cells {
         (cells, level)
     }
 
-    /// Divides cells of one level until little is left in them, or the deepest level is reached; gives back those
-    /// that `leave` says.
+    /// Divides cells of one level until little is left in them, or the deepest level is reached; returns
+    /// those that `leave` chooses.
     fn refine(
         &mut self,
         mut level: Vec<Pending>,
@@ -295,7 +296,7 @@ impl Cells {
     }
 }
 
-/// Whether a cell in which so many leaves are left, and which has kept them for so many levels, is not divided further.
+/// Whether a cell is not divided further that has `leaves` left, and has kept them for `in_vain` levels.
 pub(super) fn is_final(depth: u32, leaves: usize, in_vain: u32) -> bool {
     let enough = leaves <= FEW_LEAVES || in_vain >= LEVELS_IN_VAIN;
     depth >= MAX_DEPTH || (depth >= DEPTH && enough)

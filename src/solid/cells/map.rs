@@ -1,7 +1,7 @@
 //! A box divided into cells that know what matters in them: fluid, inside, or the few leaves of a surface
 //! nearby.
 //!
-//! Where a part is proven to be outside or inside it is dropped from the cell and from all cells within it. A
+//! A part that is proven to be outside or inside is dropped from the cell and from all cells within it. A
 //! point far from every surface then costs one look-up, and one near a surface the evaluation of the leaves
 //! that are left there, however many the solid has. Sign, zero set and the gradient on the surface are
 //! exactly those of the twin; the value off the surface is that of the leaf that decides in the cell, and
@@ -33,14 +33,15 @@ use crate::solid::twin::Twin;
 /// Points that are looked up together.
 pub(super) const RUN: usize = 64;
 
-/// So many neighbouring points of one cell are evaluated together.
+/// At least this many neighbouring points of one cell are evaluated together.
 const SHORTEST_RUN: usize = 4;
 
 /// Cells that are looked at one by one for a range; for larger boxes all leaves are.
 const MOST_TOUCHED: usize = 4096;
 
-/// How far off the surface, in longest sides of the flat grid's cells, gradients come from the leaves nearby and not
-/// from the twin, which asks all of them. Meshes are mended by gradients within one of their own cells.
+/// How far off the surface, in longest sides of the flat grid's cells, gradients come from the leaves nearby
+/// and not from the twin, which evaluates all of them. Meshes are mended by gradients within one of their own
+/// cells.
 const AROUND: f64 = 1.5;
 
 /// What a map knows of a place.
@@ -219,8 +220,8 @@ impl CellMap {
         self.parts.leaves.decide(words, &mut 0, p)
     }
 
-    /// What gives the gradient at a point: the tree of its cell, or what decides around it. `None` far from all surfaces and
-    /// outside the box.
+    /// What gives the gradient at a point: the tree of its cell, or what decides around it. `None` far from
+    /// all surfaces and outside the box.
     #[inline]
     pub(super) fn words_for(&self, p: DVec3) -> Option<&[u32]> {
         match self.cells.find(p)?.cell {
@@ -357,7 +358,7 @@ impl CellMap {
                 Known::Near(words) => {
                     let entry = Sweep::new(&self.parts.leaves, path).first_entry(words, (t, end));
                     match entry {
-                        // the border of the cell has cut off what would decide it
+                        // the border of the cell has cut off the part that would decide it
                         Some(entry) if !entry.certain && entry.until >= end && end < 1.0 => {
                             return self.twin.first_entry(&Path { start: entry.t, ..*path });
                         }
@@ -476,8 +477,8 @@ impl CellMap {
         domain.union(over) == domain && !over.is_empty()
     }
 
-    /// The range over a box from the cells that it touches: as soon as both signs are found, all numbers. `None` for a box
-    /// that is not in the domain, or touches too many cells.
+    /// The range over a box from the cells that it touches: as soon as both signs are found, all numbers.
+    /// `None` for a box that is not in the domain, or touches too many cells.
     fn range_by_cells(&self, over: &Aabb) -> Option<Interval> {
         if !self.is_within(over) {
             return None;

@@ -1,9 +1,9 @@
-//! A cell map of a solid that moves: rebuilt only where it can have changed, and only now and then.
+//! A cell map of a solid that moves: rebuilt only where it may have changed, and only from time to time.
 //!
 //! Ranges over a cell *and a stretch of time* judge a cell for all of that time. For the whole run this
 //! settles the cells that the solid never comes near, those that it never leaves, and those in which nothing
-//! but parts at rest matters. The others are divided anew for each *window* of time, a stretch of some steps, as far as
-//! somebody asks for them; in between a step costs what it costs with a solid at rest.
+//! but parts at rest matters. The others are divided again for each *window* of time, a stretch of some
+//! steps, as far as they are asked for. In between, a step costs what it costs with a solid at rest.
 //!
 //! Windows begin at whole multiples of their length, so that an answer does not depend on the steps before.
 
@@ -31,7 +31,7 @@ pub struct MovingMap {
 /// A window also holds this part of the next one, so that a step which begins in it ends in it.
 const OVERLAP: f64 = 0.5;
 
-/// Windows of a run, at most: the rounding of their beginnings stays below a millionth of one.
+/// Maximum number of windows of a run: the rounding of their beginnings stays below a millionth of one.
 const MOST_WINDOWS: f64 = 1e9;
 
 impl MovingMap {
@@ -86,7 +86,7 @@ impl MovingMap {
         Some(cells)
     }
 
-    /// How many cells may be divided anew for each window. The box has 4096 on their level.
+    /// How many cells may be divided again for each window. The box has 4096 on their level.
     pub fn restless(&self) -> usize {
         self.restless.len()
     }

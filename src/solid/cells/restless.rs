@@ -1,7 +1,8 @@
-//! The cells in which something moves, divided for a window of time where somebody asks.
+//! The cells in which something moves, divided for a window of time on demand.
 //!
-//! A body that moves may touch a large part of its box, and the fluid beside it a small part of that. To divide all of it anew
-//! for each window cost ten times as much as a step of a fluid of some hundred particles.
+//! A moving body may touch a large part of its box, while the fluid beside it touches only a small part of
+//! that. Dividing all of it again for each window cost ten times as much as a step of a fluid of some hundred
+//! particles.
 //!
 //! Invariant: what a cell keeps depends on the cell and on the window alone, and not on what was asked before.
 
@@ -17,16 +18,17 @@ use crate::solid::leaves::leaf_set::LeafTree;
 use crate::solid::leaves::pruning::Verdict;
 use crate::solid::leaves::words::leaf_count;
 
-/// Most different trees that are found by their numbers. Cells with others are looked for each time they are asked for.
+/// Maximum number of different trees that are found by their numbers. Cells with other trees are searched at
+/// each request.
 const MOST_TREES: usize = 1 << 10;
 
-/// What is noted of a cell of the flat grid while nothing is known of it.
+/// The note of a cell of the flat grid about which nothing is known yet.
 const UNKNOWN: u32 = 0;
 /// The note of a cell that is fluid.
 const FLUID: u32 = 1;
 /// The note of a cell inside the solid.
 const INSIDE: u32 = 2;
-/// The note of a cell that is looked for each time, because it is divided, or has a tree without a number.
+/// The note of a cell that is searched each time, because it is divided, or has a tree without a number.
 const ELSEWHERE: u32 = 3;
 /// The note of a cell whose tree has the number 0; the others follow.
 const FIRST_TREE: u32 = 4;
@@ -44,8 +46,8 @@ pub(super) struct Restless {
     left: Arc<[Pending]>,
     /// How each is divided.
     divided: Vec<OnceLock<Divided>>,
-    /// What is known of the cells of the flat grid, x fastest, then y: they are asked for all the time. Empty if no cell is
-    /// restless.
+    /// What is known of the cells of the flat grid, x fastest, then y: they are needed all the time. Empty if
+    /// no cell is restless.
     noted: Vec<AtomicU32>,
     trees: Trees,
 }
@@ -128,8 +130,8 @@ impl Trees {
 }
 
 impl Restless {
-    /// The cells that [`Cells::lasting`](super::grid::Cells::lasting) has left, for a solid during a window of time. They are
-    /// grown by a positive margin.
+    /// The cells that [`Cells::lasting`](super::grid::Cells::lasting) has left, for a solid during a window
+    /// of time. They are grown by a positive margin.
     pub fn new(left: Arc<[Pending]>, parts: Arc<LeafTree>, domain: Aabb, margin: f64) -> Self {
         let divided = left.iter().map(|_| OnceLock::new()).collect();
         let (noted, trees) =
@@ -177,8 +179,8 @@ impl Restless {
         node.seen()
     }
 
-    /// What is known of one of the eight parts of a cell: the one of the number `k`, with its depth and its number along each
-    /// axis.
+    /// What is known of one of the eight parts of a cell: the one of the number `k`, with its depth and its
+    /// number along each axis.
     pub fn octant<'a>(&'a self, parent: &'a Divided, place: (u32, UVec3), k: usize) -> Seen<'a> {
         self.node(parent, place, k).seen()
     }

@@ -1,5 +1,5 @@
-//! The twin's value at many points, from the leaves that decide it near each. It differs from the value of the twin's own
-//! program by rounding, and where a leaf occurs with several factors; its sign is the same.
+//! The twin's value at many points, from the leaves that decide it near each. It differs from the value of
+//! the twin's own program by rounding, and where a leaf occurs with several factors; its sign is the same.
 
 use glam::DVec3;
 

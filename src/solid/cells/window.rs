@@ -1,4 +1,4 @@
-//! What the cells of a box say during a window of time, or for ever if nothing in it moves.
+//! What the cells of a box hold during a window of time, or always if nothing in the box moves.
 
 use std::ops::ControlFlow;
 use std::sync::Arc;
@@ -54,8 +54,8 @@ impl Window {
         Self::new(Arc::new(cells), Arc::new([]), parts, margin)
     }
 
-    /// The cells that last, and those left of them, for the parts of a solid during a window of time. `margin` is that by which
-    /// cells were grown.
+    /// The cells that last, and those left of them, for the parts of a solid during a window of time.
+    /// `margin` is that by which cells were grown.
     pub fn new(cells: Arc<Cells>, left: Arc<[Pending]>, parts: Arc<LeafTree>, margin: f64) -> Self {
         let restless = Restless::new(left, parts, cells.domain, margin);
         Self { cells, restless }
@@ -112,7 +112,8 @@ impl Window {
     /// Below a cell of the flat grid; `q` is the place in it, 0 to 1.
     fn descend<'a>(&'a self, mut part: Part<'a>, mut place: u64, mut at: UVec3, mut q: DVec3) -> Found<'a> {
         let mut depth = DEPTH;
-        // a cell of a window is told by that of the flat grid which holds it, and by the octants on the way from there
+        // a cell of a window is identified by the cell of the flat grid that holds it, and by the octants on
+        // the way from there
         let (holder, mut way) = (MOVING | place << BELOW, 1);
         loop {
             part = match part {
@@ -141,15 +142,16 @@ impl Window {
         bounds(&self.cells.domain, depth, q.clamp(DVec3::ZERO, DVec3::splat(side - 1.0)).as_uvec3())
     }
 
-    /// Whether a box within the domain touches fluid alone, as far as the flat grid says, and no more than `most` of its
-    /// cells.
+    /// Whether a box within the domain touches fluid alone, as far as the flat grid says, and no more than
+    /// `most` of its cells.
     pub fn is_fluid(&self, over: &Aabb, most: usize) -> bool {
         let is_fluid = |(at, cell)| matches!(self.part(cell, at), Part::Known(Known::Fluid));
         self.touched(over, most).is_some_and(|mut cells| cells.all(is_fluid))
     }
 
-    /// Visits the undivided cells that a box within the domain touches, and perhaps some beside it, with their depths. The
-    /// visit ends where `visit` breaks it off. `None` if the box touches more than `most` cells of the flat grid.
+    /// Visits the undivided cells that a box within the domain touches, and perhaps some beside it, with
+    /// their depths. The visit ends when `visit` breaks. `None` if the box touches more than `most` cells of
+    /// the flat grid.
     pub fn visit<'a, B>(
         &'a self,
         over: &Aabb,
@@ -196,8 +198,8 @@ impl Window {
         ControlFlow::Continue(())
     }
 
-    /// The cells of the flat grid that a box within the domain touches, with their numbers along the axes; `None` if they are
-    /// more than `most`.
+    /// The cells of the flat grid that a box within the domain touches, with their numbers along the axes;
+    /// `None` if they are more than `most`.
     fn touched(&self, over: &Aabb, most: usize) -> Option<impl Iterator<Item = (UVec3, Cell)> + '_> {
         let cells = &*self.cells;
         let number = |p: DVec3| {
@@ -225,8 +227,8 @@ impl Window {
     }
 }
 
-/// The number of the octant of a cell in which a place lies, 0 to 1 along each axis. The place becomes that in the octant, and the
-/// cell's number along each axis the octant's.
+/// The number of the octant of a cell in which a place lies, 0 to 1 along each axis. The place becomes that
+/// in the octant, and the cell's number along each axis the octant's.
 #[inline]
 fn next_octant(q: &mut DVec3, at: &mut UVec3) -> u32 {
     let upper = q.cmpge(DVec3::splat(0.5));

@@ -36,7 +36,8 @@ impl Leaves {
         };
         let head = faces.len();
         faces.push(Part::All(parts));
-        // what one of "all of" does not reach, none of it does; in "any of" it only drops out
+        // if one member of "all of" does not reach a place, the whole does not; a member of "any of" only
+        // drops out
         let (mut kept, mut near) = (0, all);
         for _ in 0..parts {
             let first = faces.len();

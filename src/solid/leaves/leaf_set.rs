@@ -25,7 +25,7 @@ struct Leaf {
     first: u32,
     /// Where the numbers begin that depend on time alone.
     first_uniform: u32,
-    /// Whether machine code may answer for its range. For leaves that move [`Ranges`] says it.
+    /// Whether machine code may answer for its range. For leaves that move, see [`Ranges`].
     tame: bool,
     /// What its value is multiplied by in the twin.
     factor: f64,
@@ -204,8 +204,8 @@ impl Leaves {
         self.range_on(Demand::Few, leaf, over)
     }
 
-    /// [`Self::range`] for those who ask for very many, by machine code where it pays. Its bounds may differ by
-    /// roundings.
+    /// [`Self::range`] for callers that need very many ranges, by machine code where it pays. Its bounds may
+    /// differ by roundings.
     pub fn range_among_many(&self, leaf: u32, over: &Aabb) -> Interval {
         self.range_on(Demand::Many, leaf, over)
     }
@@ -256,8 +256,8 @@ impl Leaves {
         shape.range.eval_with(&Region { parameters: constants, uniforms, ..Region::of(over) })
     }
 
-    /// An interval that contains the value of a tree in prefix form at every point of a box, at all times of the stretch; all
-    /// numbers if a leaf may be NaN. `at` is moved past the tree.
+    /// An interval that contains the value of a tree in prefix form at every point of a box, at all times of
+    /// the stretch; all numbers if a leaf may be NaN. `at` is moved past the tree.
     pub fn range_of_tree(&self, words: &[u32], at: &mut usize, over: &Aabb) -> Interval {
         let word = Word::read(words[*at]);
         *at += 1;

@@ -1,8 +1,8 @@
 //! Formulas in pieces: `round(z/d)` has one value on each side of its jumps.
 //!
-//! A box in which a formula may jump has a range that mixes both sides: what is one pitch below a coil of a spring, and
-//! what is one above, seem to meet. With each value of the jump by itself the bounds are those of two smooth formulas,
-//! and what is far from the surface on either side is seen to be.
+//! A box in which a formula may jump has a range that mixes both sides: the coils one pitch below and one
+//! pitch above a coil of a spring seem to meet. If each value of the jump is treated separately, the bounds
+//! are those of two smooth formulas, and a box that is far from the surface is recognised as far.
 
 use std::sync::OnceLock;
 
@@ -55,7 +55,7 @@ impl Pieces {
     /// `None` for a formula without jumps.
     pub fn new(graph: &Graph, root: Node, parameters: usize) -> Option<Self> {
         let used = graph.reachable(&[root]);
-        // what only chooses between two values has ranges that know it
+        // an operation that only chooses between two values has ranges that know it
         let known: FxHashSet<Node> = choosing_numbers(graph).into_iter().collect();
         let mut out = Graph::like(graph);
         let mut image: Vec<Option<Node>> = Vec::with_capacity(graph.len());

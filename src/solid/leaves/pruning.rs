@@ -24,8 +24,8 @@ pub fn prune(words: &[u32], range: &mut impl FnMut(u32) -> Interval, left: &mut 
     Pruning { words, range, left }.tree(&mut 0).0
 }
 
-/// What may decide the value of a tree in a region where each leaf has a known range: a tree with the same value at
-/// every point of the region.
+/// The part of a tree that may decide its value in a region where each leaf has a known range: a tree with
+/// the same value at every point of the region.
 ///
 /// A part of "any of" that is below another one throughout drops out, and a part of "all of" that is above another one.
 /// A leaf with an unknown range may be NaN, which decides: it stays.

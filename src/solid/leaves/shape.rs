@@ -16,13 +16,13 @@ use crate::simplify::simplify;
 use crate::solid::engine::Engine;
 use crate::solid::programs::compiled::{LeafProgram, RangeProgram};
 
-/// Ranges of so many leaves of one shape come from machine code, which costs as much time to make as some
-/// thousand ranges by the interpreter. The number of leaves decides, not that of the calls, so that the
-/// bounds of a leaf never depend on what was asked before.
+/// From this number of leaves of one shape on, their ranges come from machine code; compiling takes as long
+/// as about a thousand ranges by the interpreter. The number of leaves decides, not that of the calls, so
+/// that the bounds of a leaf never depend on what was asked before.
 const MANY_LEAVES: usize = 8;
 
-/// The operations of all leaves of a shape from which on machine code pays for those who ask for some ten thousand
-/// ranges, as the search for thin parts and the cell map do.
+/// If all leaves of a shape together have at least this many operations, machine code pays for callers that
+/// ask for some ten thousand ranges, as the search for thin parts and the cell map do.
 const MANY_OPERATIONS: usize = 24;
 
 /// What a function of the library costs, in operations.
@@ -33,7 +33,7 @@ const OPERATIONS_OF_A_CALL: usize = 8;
 pub enum Demand {
     /// A few for each leaf.
     Few,
-    /// As many as a grid of cells needs.
+    /// The number that a grid of cells needs.
     Many,
 }
 
@@ -202,7 +202,7 @@ impl Shape {
     /// Whether ranges come from machine code.
     pub fn pays(&self, demand: Demand) -> bool {
         match demand {
-            // those of a leaf that moves are asked for again and again
+            // those of a leaf that moves are needed again and again
             Demand::Few => self.leaves >= MANY_LEAVES || self.motion.is_some(),
             Demand::Many => self.leaves * self.operations >= MANY_OPERATIONS || self.pays(Demand::Few),
         }
@@ -327,7 +327,8 @@ mod tests {
     use super::*;
     use crate::ir::Axis;
 
-    /// Ranges of the slopes of min(x + y, 1.25·x + y, 4 − |z|) by machine code, where it may be either of the first two.
+    /// Ranges of the slopes of min(x + y, 1.25·x + y, 4 − |z|) by machine code, where it may be either of the
+    /// first two.
     #[test]
     fn slopes_of_a_minimum_are_those_of_either_operand() {
         let mut graph = Graph::default();

@@ -1,8 +1,8 @@
 //! A solid as leaves joined by "all of" and "any of".
 //!
 //! Negations are pushed down to the leaves and positive factors dropped. The tree has the sign of ω, not its
-//! value; with each leaf times its factors it has the value of the twin but for rounding, unless a leaf occurs with several
-//! factors.
+//! value; with each leaf times its factors it has the value of the twin, up to rounding, unless a leaf occurs
+//! with several factors.
 
 use std::collections::HashMap;
 

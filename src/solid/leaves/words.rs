@@ -18,9 +18,9 @@ pub enum Word {
         leaf: u32,
         negated: bool,
     },
-    /// So many trees follow, of which the smallest decides.
+    /// The minimum of the given number of trees, which follow.
     All(u32),
-    /// So many trees follow, of which the largest decides.
+    /// The maximum of the given number of trees, which follow.
     Any(u32),
 }
 
@@ -69,8 +69,8 @@ pub fn skip(words: &[u32], at: &mut usize) {
     }
 }
 
-/// Whether a tree is surely negative. `leaf` says it of a leaf, given its number and whether it is negated;
-/// `None` as soon as it knows nothing of one, which may then be NaN.
+/// Whether a tree is surely negative. `leaf` decides that for a leaf, given its number and whether it is
+/// negated. `None` as soon as it knows nothing about a leaf, which may then be NaN.
 pub fn is_negative(
     words: &[u32],
     at: &mut usize,

@@ -38,8 +38,8 @@ pub struct Break {
     pub operation: String,
 }
 
-/// ω that differs by more than this part of what it is near by, between neighbouring numbers, jumps. Roots at zero
-/// differ by 1e-5 at most.
+/// ω jumps if between neighbouring numbers it differs by more than this part of its size nearby. Roots at
+/// zero differ by 1e-5 at most.
 const JUMP: f64 = 1e-2;
 
 /// ω that grows by this factor towards a point has no bound there.
@@ -48,16 +48,18 @@ const GROWTH: f64 = 1e6;
 /// Solids with more operations are not looked at.
 const MOST_OPERATIONS: usize = 4000;
 
-/// Places at which an operation is looked at more closely, at most: most tell the same.
+/// Maximum number of places at which an operation is looked at more closely. Most of them show the same.
 const MOST_LOOKS: usize = 100;
 
-/// Operations that are carried out in search of zeros of all divisors together, at most: less than half a second.
+/// Maximum number of operations that are carried out in search of zeros of all divisors together: less than
+/// half a second.
 const POLE_OPERATIONS: usize = 100_000_000;
 
-/// Evaluations of the whole formula at one such zero, at most.
+/// Maximum number of evaluations of the whole formula at one such zero.
 const EVALUATIONS_OF_LOOK: usize = 10;
 
-/// An operation jumps if its value changes by so many times as much as its operands, between neighbouring numbers.
+/// An operation jumps if between neighbouring numbers its value changes by more than this factor times the
+/// change of its operands.
 const SUDDEN: f64 = 1e6;
 
 impl Solid {
@@ -130,8 +132,8 @@ impl Solid {
     /// Whether ω has no bound between two neighbouring points on an edge, at which a divisor differs in sign.
     fn has_pole(&self, edge: [DVec3; 2], ends: [DVec3; 2]) -> bool {
         let scale = edge.map(|p| self.omega(p).abs()).into_iter().fold(0.0, f64::max);
-        // where the divisor is exactly zero ω may be no number although it has a limit, such as sin(x)/x, or finite although
-        // it has none: the points beyond count as well
+        // where the divisor is exactly zero ω may be no number although it has a limit, such as sin(x)/x, or
+        // finite although it has none: the points beyond count as well
         let [a, b] = ends;
         let sizes = [a, b, a + (a - b), b + (b - a)].map(|p| self.omega(p).abs());
         // ω is no number at all of them if it is made of infinite quotients
@@ -221,8 +223,8 @@ impl<'a> Formula<'a> {
         columns
     }
 
-    /// Whether each operation takes part in ω at one of some points at least, given the values of all there. What is chosen
-    /// away by `where` is multiplied by zero.
+    /// Whether each operation takes part in ω at one of some points at least, given the values of all there.
+    /// Values that `where` does not choose are multiplied by zero.
     fn taking_part(&self, at: &[Vec<f64>]) -> Vec<bool> {
         let (_, root) = self.solid.formula();
         let mut takes_part = vec![false; self.nodes.len()];
@@ -257,8 +259,8 @@ impl<'a> Formula<'a> {
         self.nodes.iter().find(is_sudden).map(|(node, _)| *node)
     }
 
-    /// The operation by which ω has no value at a point: found from the root downwards, because what has no value and is not
-    /// chosen harms nothing.
+    /// The operation by which ω has no value at a point: found from the root downwards, because an operation
+    /// without a value that is not chosen does no harm.
     fn without_value(&self, p: DVec3) -> Option<Node> {
         let (graph, mut node) = self.solid.formula();
         let values = self.values(p);
@@ -268,7 +270,7 @@ impl<'a> Formula<'a> {
         }
         loop {
             let operands = || graph.expr(node).operands().filter(|operand| !value(*operand).is_finite());
-            // of NaN and ∞ the one explains the other only if there is nothing else
+            // NaN and ∞ explain one another only if there is nothing else
             let alike = operands().find(|operand| value(*operand).is_nan() == value(node).is_nan());
             match alike.or_else(|| operands().next()) {
                 Some(operand) => node = operand,

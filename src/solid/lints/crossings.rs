@@ -5,11 +5,11 @@ use glam::DVec3;
 use crate::geom::Aabb;
 use crate::solid::construction::Solid;
 
-/// Nodes along each side of a lattice that shows where the faces of a solid are. Their number is even, so that no edge lies on
-/// an axis through the middle: an angle around it has no value there.
+/// Nodes along each side of a lattice that shows where the faces of a solid are. Their number is even, so
+/// that no edge lies on an axis through the middle: an angle around it has no value there.
 pub const FEW_NODES: usize = 26;
 
-/// Points of the surface that are found at most.
+/// Maximum number of points of the surface that are found.
 pub const MOST_POINTS: usize = 1500;
 
 /// How often a stretch is halved until its ends are neighbouring numbers, unless they are next to 0.
@@ -53,8 +53,8 @@ impl Lattice {
         })
     }
 
-    /// Where the surface crosses edges, each halved so often, and how many crossings there are for each of these: if there
-    /// are more than `most` some of them stand for all.
+    /// The places where the surface crosses edges, each halved `halvings` times, and the number of crossings
+    /// that each place stands for: if there are more than `most`, some of them stand for all.
     pub fn crossings(&self, solid: &Solid, most: usize, halvings: usize) -> (Vec<Crossing>, usize) {
         let crossed: Vec<[usize; 2]> =
             self.edges().filter(|[a, b]| self.signs[*a] * self.signs[*b] < 0.0).collect();
@@ -73,8 +73,8 @@ impl Lattice {
     }
 }
 
-/// At most so many members of a list, spread evenly. Within each stretch of the list another one is taken, because what
-/// comes from a lattice repeats.
+/// At most `most` members of a list, spread evenly. Each stretch of the list contributes a member from
+/// another place in it, because what comes from a lattice repeats.
 pub fn evenly<T>(list: &[T], most: usize) -> impl Iterator<Item = &T> {
     let every = list.len().div_ceil(most).max(1);
     list.chunks(every)
@@ -82,7 +82,7 @@ pub fn evenly<T>(list: &[T], most: usize) -> impl Iterator<Item = &T> {
         .map(move |(i, chunk)| &chunk[i.wrapping_mul(0x9E37_79B1) / 64 % chunk.len()])
 }
 
-/// Halves a stretch so often, or as long as numbers allow, so that `holds` differs at its ends.
+/// Halves a stretch `halvings` times, or as long as numbers allow, so that `holds` differs at its ends.
 pub fn halved([mut a, mut b]: [DVec3; 2], halvings: usize, holds: impl Fn(DVec3) -> bool) -> [DVec3; 2] {
     let at_first = holds(a);
     for _ in 0..halvings {

@@ -1,7 +1,7 @@
 //! Operands of `and` and `or` whose removal changes nothing.
 //!
-//! Points of a lattice show of most operands that they matter. For each that is left, all of space is divided into
-//! boxes, in which ranges of the leaves must prove that it does not.
+//! Points of a lattice show that most operands matter. For each of the others, all of space is divided into
+//! boxes, in which ranges of the leaves must prove that it does not matter.
 
 use glam::DVec3;
 
@@ -16,11 +16,11 @@ use crate::solid::leaves::leaf_set::Leaves;
 /// Points along each side of the lattice.
 const POINTS: usize = 17;
 
-/// The lattice covers the bounds and so much around them, as a part of their longest side: what cuts something off is seen
-/// there.
+/// The lattice covers the bounds and a margin around them, as a part of their longest side, because an
+/// operand that cuts something off shows there.
 const MARGIN: f64 = 0.3;
 
-/// Operations that are spent on one operand at most: some tenths of a second.
+/// Maximum number of operations that are spent on one operand: some tenths of a second.
 const OPERATIONS_OF_ONE: usize = 8_000_000;
 
 /// What a leaf costs beside its operations, for its range and the signs of its operands, in operations.
@@ -46,16 +46,16 @@ pub struct Idle {
 enum Proof {
     /// The solid is the same without it.
     Idle,
-    /// It matters at a point, or where boxes are too small to tell.
+    /// It matters at a point, or boxes became too small to decide.
     Open,
     /// The budget ended.
     Cut,
 }
 
 impl Solid {
-    /// The places in a text of operands that could be left out: the solid has the same points without each of them, and
-    /// without all of them together. Of a solid that moves or has no bounds nothing is known. `budget` counts operations,
-    /// and may be shared by many solids.
+    /// The places in a text of operands that could be left out: the solid has the same points without each of
+    /// them, and without all of them together. Nothing is known for a solid that moves or has no bounds.
+    /// `budget` counts operations, and may be shared by many solids.
     pub fn idle_operands(&self, source: SourceId, budget: &mut usize) -> Idle {
         let mut found = Idle::default();
         let (graph, root) = self.formula();
@@ -91,8 +91,8 @@ impl Solid {
 }
 
 impl Operands {
-    /// Operands that a person has written as such, and could remove: each at a place of its own in the text. The members
-    /// of a fold and the parts of a standard solid share theirs.
+    /// Operands that a person has written as such, and could remove: each at a place of its own in the text.
+    /// The members of a fold and the parts of a standard solid share theirs.
     fn candidates(&self, source: SourceId) -> Vec<usize> {
         let place = |i: usize| self.all[i].span.filter(|span| span.source == source);
         let is_outermost = |i: &usize| match self.all[*i].joined {

@@ -1,5 +1,5 @@
-//! What in a solid is most likely not meant: parts without an effect, operands of very different size, a formula that
-//! jumps or has no value.
+//! Likely mistakes in a solid: parts without an effect, operands of very different size, a formula that jumps
+//! or has no value.
 //!
 //! | file | what it finds |
 //! |---|---|

@@ -1,4 +1,4 @@
-//! The operands of all `and` and `or` of a solid, as a tree, and what their signs say of one another.
+//! The operands of all `and` and `or` of a solid, as a tree, and what their signs say about one another.
 
 use std::collections::HashMap;
 
@@ -89,7 +89,8 @@ impl Operands {
         Some(Self { all: reader.all, leaves: nodes.len() })
     }
 
-    /// For each operand, whether the sign of the whole is known to be the same without it, given the signs of the leaves.
+    /// For each operand, whether the sign of the whole is known to be the same without it, given the signs of
+    /// the leaves.
     pub fn without_effect(&self, leaves: &[Sign], removed: &[bool]) -> Vec<bool> {
         let signs = self.signs(leaves, removed);
         // whether the sign of the whole does not depend on that of this operand

@@ -11,9 +11,9 @@ const POINTS: usize = 32;
 const BESIDE: f64 = 1e-4;
 
 impl Solid {
-    /// A place at which ω is exactly zero although all around it is inside: where an outline with an edge on the axis is
-    /// turned about it. It is looked for on the axes of the scene and on those of the box around the solid, one of which is
-    /// the axis of a body that was turned.
+    /// A place at which ω is exactly zero although everything around it is inside. This happens if an outline
+    /// with an edge on the axis is turned about that axis. It is looked for on the axes of the scene and on
+    /// those of the box around the solid, one of which is the axis of a body that was turned.
     pub fn seam(&self) -> Option<DVec3> {
         let bounds = self.bounds().aabb()?;
         let beside = BESIDE * bounds.size().max_element();

@@ -15,15 +15,15 @@ use crate::solid::construction::Solid;
 struct Search {
     /// Walls that are thinner than this length, m.
     wall: f64,
-    /// Gaps that are thinner than this length, m: a fluid needs so much room.
+    /// Gaps thinner than this length, m, are reported: a fluid needs this much room.
     gap: f64,
     /// Where a fluid may be.
     within: Aabb,
 }
 
 impl Search {
-    /// Whether a fluid may be in a gap, or on both sides of a wall, between two faces. The direction is that from the first
-    /// to the second one; the sign is 1 for a wall.
+    /// Whether a fluid may be in a gap, or on both sides of a wall, between two faces. The direction is that
+    /// from the first to the second one; the sign is 1 for a wall.
     fn is_in_fluid(&self, [first, second]: [DVec3; 2], (direction, sign): (DVec3, f64)) -> bool {
         let within = self.within.grown(-BORDER * self.within.size().max_element());
         let beyond = if sign > 0.0 { self.gap * direction } else { DVec3::ZERO };
@@ -48,32 +48,33 @@ const NODES: usize = 49;
 /// Solids with more operations are not looked at: the sign of each is needed some hundred thousand times.
 const MOST_OPERATIONS: usize = 5000;
 
-/// Signs that are needed of a solid, at most: at the nodes, and for each point of the surface on its edge and on two lines,
-/// of which halving needs some 50 each.
+/// Maximum number of signs that are needed of a solid: at the nodes, and for each point of the surface on its
+/// edge and on two lines, of which halving needs some 50 each.
 const SIGNS: usize = NODES.pow(3) + MOST_POINTS * (50 + 2 * (STEPS + 50));
 
-/// What lies so near to the border of where a fluid may be, as a part of its longest side, lies on it.
+/// A point nearer than this to the border of the region where a fluid may be, as a part of the longest side,
+/// counts as on it.
 const BORDER: f64 = 1e-6;
 
 /// Steps along a line, and its beginning, off the surface, as a part of it.
 const STEPS: usize = 32;
 const START: f64 = 1e-6;
 
-/// The faces of a wall look in opposite directions: the cosine between their normals is at most this. So is that of a wedge
-/// whose angle is less than 12°.
+/// The faces of a wall look in opposite directions: the cosine between their normals is at most this. The
+/// same holds for a wedge whose angle is less than 12°.
 const OPPOSITE: f64 = -0.98;
 
-/// A part whose sides are smaller than the square of so many thicknesses that were asked for is a detail.
+/// A part whose sides are smaller than the square of this many of the wanted thicknesses is a detail.
 const LEAST_EXTENT: f64 = 2.0;
 
 impl Solid {
-    /// The thinnest wall and the thinnest gap of the solid that are thinner than a length each, and extend over twice this
-    /// length at least; `None` where there is none. Very large solids are not looked at, nor are those
-    /// without bounds in a box without them.
+    /// The thinnest wall and the thinnest gap of the solid that are thinner than a length each, and extend
+    /// over twice this length at least; `None` where there is none. Very large solids are not looked at, nor
+    /// are those without bounds in a box without them.
     ///
-    /// A fluid may be in a finite box. Both faces of a gap must lie in it, and beyond both faces of a wall there must be as
-    /// much room in it as a gap needs. The search takes its operations from a budget; if they are not left there it finds
-    /// nothing.
+    /// A fluid may be in a finite box. Both faces of a gap must lie in it, and beyond both faces of a wall
+    /// there must be as much room in it as a gap needs. The search takes its operations from a budget; if too
+    /// few are left, it finds nothing.
     pub fn thin_parts(
         &self,
         [wall, gap]: [f64; 2],
@@ -105,7 +106,8 @@ impl Solid {
             if !(0.5..2.0).contains(&normal.length()) {
                 continue;
             }
-            // each edge of the lattice stands for the face of a cell; a face is crossed by edges of all three directions
+            // each edge of the lattice stands for the face of a cell; a face is crossed by edges of all three
+            // directions
             let axis = (0..3).find(|&axis| p[axis] != other[axis]).unwrap_or(0);
             let face = cell[(axis + 1) % 3] * cell[(axis + 2) % 3];
             let area = every as f64 * face * normal[axis].abs();
@@ -133,8 +135,8 @@ impl Solid {
         })
     }
 
-    /// The next face along a line from a point of the surface, if it is nearer than a length and looks the other way. Along
-    /// the line up to there the solid has one sign.
+    /// The next face along a line from a point of the surface, if it is nearer than a length and looks the
+    /// other way. Along the line up to there the solid has one sign.
     fn other_face(&self, p: DVec3, (direction, sign): (DVec3, f64), length: f64) -> Option<DVec3> {
         let place = |part: f64| p + direction * (length * part);
         let places = |step: usize| place((step as f64 / STEPS as f64).max(START));

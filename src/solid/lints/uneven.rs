@@ -19,11 +19,11 @@ pub struct Uneven {
     pub gradients: [f64; 2],
 }
 
-/// The factor between gradients from which on they are reported.
+/// Gradients that differ by at least this factor are reported.
 const FACTOR: f64 = 1e3;
 
-/// Points of the surface that are looked at, at most, and how often an edge is halved to find one: much nearer than leaves
-/// are compared.
+/// Maximum number of points of the surface that are looked at, and how often an edge is halved to find one:
+/// much nearer than leaves are compared.
 const POINTS: usize = 400;
 const HALVINGS: usize = 20;
 
@@ -34,8 +34,8 @@ const DIFFERENCE: f64 = 1e-4;
 const LEAST_POINTS: usize = 5;
 
 impl Solid {
-    /// The operands of `and` and `or` whose gradients at the surface differ by a factor of 1000 or more. Only what is seen
-    /// on the surface counts.
+    /// The operands of `and` and `or` whose gradients at the surface differ by a factor of 1000 or more. Only
+    /// what is seen on the surface counts.
     pub fn uneven_operands(&self) -> Vec<Uneven> {
         let (graph, root) = self.formula();
         let (Some(bounds), Some(parts)) = (self.bounds().aabb(), self.parts()) else { return Vec::new() };
@@ -43,7 +43,7 @@ impl Solid {
         let space = bounds.grown(0.01 * bounds.size().max_element());
         let mut of_leaf: Vec<Vec<f64>> = vec![Vec::new(); operands.leaves];
         let lattice = Lattice::of(self, &space, FEW_NODES);
-        // a difference tells the size of a gradient well enough, and needs no program
+        // a difference gives the size of a gradient well enough, and needs no program
         let step = DIFFERENCE * lattice.cell().max_element();
         for crossing in lattice.crossings(self, POINTS, HALVINGS).0 {
             let p = crossing.ends[0];

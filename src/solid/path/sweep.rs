@@ -22,8 +22,8 @@ use crate::solid::leaves::words::{Word, is_negative, skip};
 /// Undecided stretches shorter than this part of the path are not narrowed further.
 const SHORTEST: f64 = 1e-12;
 
-/// Enclosures for one path at most. A path needs a handful, or some forty where a leaf has no slope at a
-/// root; what is undecided then stays possible.
+/// Maximum number of enclosures for one path. A path needs a handful, or some forty where a leaf has no slope
+/// at a root; what is undecided then stays possible.
 const MOST_ENCLOSURES: u32 = 1_000;
 
 /// Leaves whose distances from the entry differ by less than this part of the path decide together.

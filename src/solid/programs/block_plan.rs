@@ -17,7 +17,7 @@ use crate::ir::{Binary, Expr, Form, Forms, Graph, Node, R0, Unary};
 /// Up to this many pieces one program computes them all: it shares what they have in common, such as x² + y².
 const FEW_PIECES: usize = 16;
 
-/// So many pieces of one shape make a shared program worth its call.
+/// From this number of pieces of one shape on, a shared program is worth its call.
 const SAME_SHAPE: usize = 4;
 
 #[derive(Debug, Clone, PartialEq)]
@@ -229,7 +229,7 @@ struct Planner<'g> {
     steps: Vec<BlockStep<Slot>>,
 }
 
-/// A result while columns are not yet given: the node that it is, or one that nobody reads.
+/// A result while columns are not yet given: the node that it is, or an unused one.
 type Slot = Option<Node>;
 
 impl Planner<'_> {

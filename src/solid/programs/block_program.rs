@@ -22,7 +22,7 @@ use crate::ir::{Graph, Node};
 /// first-level data cache of 32 KiB.
 const CACHED_BYTES: usize = 24 << 10;
 
-/// Points of a block, at least and at most; a multiple of every vector's lanes.
+/// Least and greatest number of points of a block; a multiple of every vector's lanes.
 const SHORTEST: usize = 128;
 const LONGEST: usize = 256;
 

@@ -15,7 +15,7 @@ use crate::precision::Precision;
 /// The largest number of outputs of a program: distance, normal and curvature.
 const MAX_OUTPUTS: usize = 5;
 
-/// Points in one vector, at most.
+/// Maximum number of points in one vector.
 const MAX_LANES: usize = 4;
 
 /// How many uniforms a graph has.

@@ -123,7 +123,7 @@ impl Programs {
             [root] => vec![guarded(&mut graph, root, guard, &mut forms)],
             _ => outputs.into_iter().map(|output| graph.binary(Binary::Add, output, guard)).collect(),
         };
-        // what the guard has replaced is not computed any more
+        // what the guard has replaced is no longer computed
         let used = graph.reachable(&outputs);
         let (graph, outputs) = graph.extract(&outputs);
         let forms = forms.map(|forms| forms.kept(&used, &graph));
