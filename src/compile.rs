@@ -213,8 +213,8 @@ impl Program {
         self.with_quantity(param, value, dimension)
     }
 
-    /// [`with`](Self::with), where the value in SI units was given with a unit of this dimension, which is to fit that of the
-    /// file, or without one.
+    /// [`with`](Self::with), where the value in SI units was given with a unit of this dimension, which is to
+    /// fit that of the file, or without one.
     ///
     /// # Errors
     /// [`Error::Diagnostics`] also if it does not.
@@ -322,7 +322,7 @@ impl Program {
 
     /// Compiles any node of the file's graph, such as the shape of a scene's fluid.
     ///
-    /// `shape` must come from the [`module`](Self::module) of this very program: after [`with`](Self::with)
+    /// `shape` must come from the [`module`](Self::module) of this same program: after [`with`](Self::with)
     /// the same node stands for another expression.
     ///
     /// # Errors
@@ -389,8 +389,9 @@ impl Program {
         }
     }
 
-    /// What the file defines, with its places there: the graph of all expressions, params, solids and scenes. Names alone are
-    /// told by [`solids`](Self::solids), [`params`](Self::params) and [`scenes`](Self::scenes).
+    /// What the file defines, with its places there: the graph of all expressions, params, solids and scenes.
+    /// If you need only names, use [`solids`](Self::solids), [`params`](Self::params) and
+    /// [`scenes`](Self::scenes).
     pub fn module(&self) -> &Module {
         &self.module
     }

@@ -1,7 +1,7 @@
-//! The other files that a file names: where they come from, and what has been read of them.
+//! The other files that a file names: where they come from, and what has been read so far.
 //!
-//! Nothing here touches a file system. A program that embeds the compiler gives a [`Reader`], which may read from a
-//! folder, an archive or memory; without one a file that names others is refused.
+//! Nothing here touches a file system. A program that embeds the compiler gives a [`Reader`], which may read
+//! from a folder, an archive or memory; without one, a file that names others is refused.
 
 use std::collections::{BTreeMap, HashMap};
 use std::fmt;
@@ -40,7 +40,7 @@ pub enum Unread {
     NoReader,
     /// The file lies outside of the folder that may be read.
     Outside,
-    /// What the file system says, or whoever reads.
+    /// What the file system says, or the [`Reader`].
     Failed(String),
 }
 
@@ -111,12 +111,12 @@ impl Files {
         self.known().files.keys().cloned().collect()
     }
 
-    /// Reads all files anew when they are next asked for.
+    /// Forgets all files, so that each is read again when it is next asked for.
     pub fn forget(&self) {
         *self.known() = Known::default();
     }
 
-    /// What was made of a file, or what `make` makes of it now.
+    /// The value that was made of a file, or the one that `make` makes of it now.
     pub(crate) fn table<E>(
         &self,
         how: String,

@@ -30,9 +30,10 @@
 //!
 //! With `default-features = false` a program that embeds the library does not compile the command line.
 //!
-//! The stages of the compiler (`syntax`, `ir`, `lower`, `simplify`, `codegen`) are not part of the interface, but for what
-//! [`compile`] shows of them: they are reachable for this package's own program, tests and benches, and change without notice. The commands (`cli`) belong
-//! to the program `rfm` and not to this library.
+//! The stages of the compiler (`syntax`, `ir`, `lower`, `simplify`, `codegen`) are not part of the interface,
+//! but for what [`compile`] shows of them: they are reachable for this package's own program, tests and
+//! benches, and change without notice. The commands (`cli`) belong to the program `rfm` and not to this
+//! library.
 
 #![warn(missing_docs)]
 

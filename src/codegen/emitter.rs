@@ -21,8 +21,8 @@ use crate::table::Table;
 pub(super) struct Emitter<'a, 'f> {
     pub builder: &'a mut FunctionBuilder<'f>,
     pub precision: Precision,
-    /// Lanes that hold a point. Functions of the library are called for no others: a single point would pay for the origin as
-    /// well. Those of `sine` take a whole vector.
+    /// Lanes that hold a point. Functions of the library are called for no others: a single point would pay
+    /// for the origin as well. Those of `sine` take a whole vector.
     lanes: u8,
     pub forms: &'a Forms,
     pub hosts: &'a Hosts,
@@ -39,7 +39,7 @@ pub(super) struct Emitter<'a, 'f> {
 pub(super) struct Hosts {
     /// The functions of the mathematical library.
     pub functions: HashMap<HostFunction, FuncRef>,
-    /// Those of `sine`: which results of a node are asked for, and what finds them.
+    /// Those of `sine`: which results of a node are needed, and what finds them.
     pub waves: HashMap<Node, (Wanted, FuncRef)>,
 }
 
@@ -142,7 +142,7 @@ impl<'a, 'f> Emitter<'a, 'f> {
     }
 
     /// A vector whose lanes have only their sign bit set. A constant, which is loaded once before a loop:
-    /// `fneg` and `fabs` would build it anew at every use.
+    /// `fneg` and `fabs` would build it again at every use.
     fn sign_bits(&mut self) -> Value {
         self.constant(-0.0)
     }
@@ -160,7 +160,7 @@ impl<'a, 'f> Emitter<'a, 'f> {
     /// The sine or the cosine of a node in every lane.
     ///
     /// # Panics
-    /// If it was not declared that this is asked for: a bug of the caller.
+    /// If this was not declared as needed: a bug of the caller.
     pub fn wave(&mut self, function: UnaryFunction, (node, x): (Node, Value)) -> Value {
         let waves = match self.waves.get(&node) {
             Some(&waves) => waves,
@@ -201,7 +201,8 @@ impl<'a, 'f> Emitter<'a, 'f> {
         self.call_behind(HostFunction::Table(lookup.part), &[address], &at)
     }
 
-    /// A host function, lane by lane, with arguments that all lanes share before the others. Lanes without a point are zero.
+    /// A host function, lane by lane, with arguments that all lanes share before the others. Lanes without a
+    /// point are zero.
     fn call_behind(&mut self, function: HostFunction, shared: &[Value], operands: &[Value]) -> Value {
         let function = self.hosts.functions[&function];
         let vector = self.vector_type();

@@ -1,6 +1,6 @@
 //! Functions that have no machine instruction: called lane by lane, the same functions that the interpreter
-//! uses. Tables of a graph are looked up by such functions too; they are told where the table is. Sines and cosines
-//! are called for the arguments alone that `sine` leaves to them.
+//! uses. Tables of a graph are looked up by such functions too; they receive the address of the table. Sines
+//! and cosines are called only for the arguments that `sine` leaves to them.
 
 use std::sync::Arc;
 

@@ -26,9 +26,9 @@ pub struct Code {
     _tables: Tables,
 }
 
-// SAFETY: `entry` points to finished code that nobody writes to again; it stays mapped until the drop of
-// `self`, and any number of threads may execute the same code. The module is behind a mutex. Tables may be looked up from
-// any thread.
+// SAFETY: `entry` points to finished code that is never written to again; it stays mapped until the drop of
+// `self`, and any number of threads may execute the same code. The module is behind a mutex. Tables may be
+// looked up from any thread.
 unsafe impl Send for Code {}
 // SAFETY: threads that share a `Code` only execute it, which is safe for the reasons above.
 unsafe impl Sync for Code {}

@@ -38,7 +38,7 @@ pub struct Request<'a> {
     pub graph: &'a Graph,
     /// Nodes that a batch program reads from columns instead of computing them; other shapes have none.
     pub inputs: &'a [Node],
-    /// The nodes whose values are asked for.
+    /// The nodes whose values are wanted.
     pub outputs: &'a [Node],
     /// The type to compute in.
     pub precision: Precision,

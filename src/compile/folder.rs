@@ -27,7 +27,7 @@ impl Reader for Folder {
         let failed = |error: std::io::Error| Unread::Failed(error.to_string());
         if let Some(within) = &self.within {
             let within = std::fs::canonicalize(within).map_err(failed)?;
-            // whether there is such a file outside is nobody's business
+            // whether there is such a file outside is not disclosed
             let inside = |path: &Path| std::fs::canonicalize(path).map(|path| path.starts_with(&within));
             let mut folder = Path::new(name);
             let is_inside = loop {

@@ -135,8 +135,8 @@ impl Diagnostic {
         })
     }
 
-    /// Adds the help "did you mean `name`?" and the edit that writes the name, if one of the candidates is near enough to
-    /// what was written.
+    /// Adds the help "did you mean `name`?" and the edit that writes the name, if one of the candidates is
+    /// near enough to what was written.
     #[must_use]
     pub fn suggest<'a>(self, written: &str, candidates: impl IntoIterator<Item = &'a str>) -> Self {
         match nearest(written, candidates) {

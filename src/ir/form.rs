@@ -14,8 +14,8 @@ pub enum Form {
     #[default]
     Stable,
     /// The textbook's formula where it loses at most four bits, the stable form for the run of 16 points in
-    /// which it loses more: ≤ 14 ulp. Over blocks only; a single point gets the stable form, unless its graph
-    /// is so large that blocks answer for single points too.
+    /// which it loses more: ≤ 14 ulp. It is used over blocks only. A single point gets the stable form,
+    /// unless its graph is so large that blocks answer for single points too.
     Guarded,
     /// u + v ∓ √(u² + v²) as written: cheapest, loses digits and at worst the sign where operands cancel.
     Textbook,

@@ -180,8 +180,8 @@ impl UnaryFunction {
         }
     }
 
-    /// Whether a value close to the largest number may come out infinite: sinh and cosh are found from eᵃ, which is twice as
-    /// large.
+    /// Whether a value close to the largest number may come out infinite: sinh and cosh are found from eᵃ,
+    /// which is twice as large.
     pub(super) fn overflows_early(self) -> bool {
         matches!(self, Self::Sinh | Self::Cosh)
     }

@@ -17,7 +17,7 @@ pub type Tables = Arc<[Arc<dyn Table>]>;
 pub struct Lookup {
     /// Number of the table in its graph.
     pub table: u32,
-    /// What is asked for.
+    /// The wanted part of its values.
     pub part: Part,
 }
 

@@ -1,8 +1,11 @@
 //! The operations: each is defined once, here, by its name and its value.
 //!
-//! The code generator is tested against these values bit for bit. An operation that is added needs a rule in
-//! every analysis (derivative, range, rounding error, truth) and an instruction. A function of the
-//! mathematical library needs less, see `function`.
+//! The code generator is tested against these values bit for bit. A new operation needs a rule in every
+//! analysis (derivative, range, magnitude, rounding error, contraction, enclosure along a path, truth), an
+//! instruction, and a form in source text. The compiler names these places, because their matches have no
+//! wildcard; only the lists for tests (`Unary::all`, `Binary::all`) and the name in the language
+//! (`lower::builtins`) may be forgotten without an error. A function of the mathematical library needs less,
+//! see `function`.
 
 use crate::ir::function::{BinaryFunction, UnaryFunction};
 use crate::ir::r0;
@@ -210,8 +213,8 @@ impl Binary {
     }
 
     /// Its value, with R₀ in its stable form.
-    // Inlined always, with what it calls: the loops over columns are compiled for several instruction sets, and a call in
-    // them would be made for each number.
+    // Inlined always, with what it calls: the loops over columns are compiled for several instruction sets,
+    // and a call in them would be made for each number.
     #[inline(always)]
     pub fn eval<T: Real>(self, a: T, b: T) -> T {
         let zero = T::from_f64(0.0);

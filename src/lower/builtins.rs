@@ -10,7 +10,7 @@ use crate::syntax::ast::{Argument, Expr, ExprKind, Name};
 #[derive(Clone, Copy)]
 struct Builtin {
     name: &'static str,
-    /// Arguments, at least and at most.
+    /// Least and greatest number of arguments.
     arity: (usize, usize),
     meaning: Meaning,
 }
@@ -305,7 +305,8 @@ impl Lowering<'_> {
         }
     }
 
-    /// The value itself; if it is known now and not positive, an error at the argument that it came from.
+    /// The value itself. If it is known now and not positive, an error is reported at the argument that it
+    /// came from.
     fn positive(&mut self, value: &Expr, what: Option<&Expr>, span: Span) -> Value {
         let result = self.expr(value);
         let Value::Number(node) = result else { return result };

@@ -117,8 +117,8 @@ fn points_of(mut rows: Vec<Vec<f64>>) -> Result<Vec<Vec<f64>>, String> {
     Ok(rows)
 }
 
-/// The numbers of each line. Lines in front of the first numbers are titles; empty lines and those that begin with `#` are
-/// passed over.
+/// The numbers of each line. Lines in front of the first numbers are titles; empty lines and those that begin
+/// with `#` are passed over.
 fn numbers(text: &str) -> Result<Vec<Vec<f64>>, String> {
     let mut rows: Vec<Vec<f64>> = Vec::new();
     for (i, line) in text.lines().enumerate() {

@@ -8,7 +8,7 @@ use crate::ir::{self, Binary, Given, Graph, Interpreter, Node, Unary};
 /// How many places a part is looked at to find what its slope is like.
 const PLACES: u32 = 48;
 
-/// Fewer places with a slope tell nothing.
+/// With fewer places that have a slope, nothing can be said.
 const FEWEST_PLACES: usize = 16;
 
 /// What counts as rounding, relative to the terms of a sum.
@@ -27,9 +27,9 @@ enum Profile {
 }
 
 impl Lowering<'_> {
-    /// The distance from the surface of a formula, with the sign of its field; `None` where it does not follow from the
-    /// slope. The formula is looked at in a cube around the box that it is known to be in, or around the origin with this
-    /// half side.
+    /// The distance from the surface of a formula, with the sign of its field; `None` where it does not
+    /// follow from the slope. The formula is looked at in a cube around the box that it is known to be in, or
+    /// around the origin with this half side.
     pub(super) fn exact_distance(
         &mut self,
         leaf: Node,
@@ -73,9 +73,9 @@ impl Lowering<'_> {
         }
     }
 
-    /// What a part's slope is like at some places within a cube, with the params as they are and otherwise. Whatever is
-    /// found here, the distance has the right sign. Its value is wrong where a formula in pieces has another slope than at
-    /// all of these places, and an offset of it is then as wrong.
+    /// Examines the slope of a part at some places within a cube, with the present params and with others.
+    /// Whatever is found here, the distance has the right sign. Its value is wrong where a formula in pieces
+    /// has another slope than at all of these places, and an offset is then wrong by as much.
     fn profile(&self, leaf: Node, middle: [f64; 3], half: f64) -> Profile {
         let (mut graph, leaf) = self.module.graph.extract_cone(leaf);
         let slopes = Slopes::of(&mut graph, leaf);
@@ -105,7 +105,7 @@ impl Lowering<'_> {
     }
 }
 
-/// What a field is like at a place: g, g² − 2ω·∂²ω/∂n², and the sizes of both terms together.
+/// The figures of a field at a place: g, g² − 2ω·∂²ω/∂n², and the sizes of both terms together.
 #[derive(Debug, Clone, Copy)]
 struct Slope {
     slope: f64,

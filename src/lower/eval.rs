@@ -14,7 +14,7 @@ use crate::syntax::ast::{AddOp, Comparison, Expr, ExprKind, Logic, MulOp, Name};
 /// of calls to get there.
 const DEEPEST_EVALUATION: usize = 2000;
 
-/// So many messages come with a suggestion. In a file with more of them something else is wrong.
+/// Number of messages that come with a suggestion. In a file with more of them something else is wrong.
 const MOST_SUGGESTIONS: usize = 100;
 
 impl Lowering<'_> {

@@ -237,7 +237,8 @@ fn transformed(name: &str, a: &[&str]) -> Option<Words> {
     Some(Words { what, help: format!("write `{example}`") })
 }
 
-/// Whether an argument is a number or a formula that may be repeated elsewhere: no name is given to it, and it is no point.
+/// Whether an argument is a number or a formula that may be repeated elsewhere: no name is given to it, and
+/// it is no point.
 fn is_a_value(argument: &str) -> bool {
     !argument.contains(['=', '[', ':']) && !["true", "false"].contains(&argument)
 }

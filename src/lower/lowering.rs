@@ -129,7 +129,8 @@ impl Lowering<'_> {
         }
     }
 
-    /// A message about a place in the standard solids, put to the call that led there: it is the user who can mend it.
+    /// A message about a place in the standard solids, moved to the call that led there, because the user can
+    /// mend only that.
     fn in_users_text(&self, mut diagnostic: Diagnostic) -> Diagnostic {
         let within = diagnostic.primary.span;
         let at = self.user_span(within);

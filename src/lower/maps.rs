@@ -6,7 +6,8 @@ use crate::geom::Aabb;
 use crate::ir::{self, Axis, Binary, Node, Unary, UnaryFunction};
 use crate::syntax::ast::Logic;
 
-/// How much of a cell's size a shape may stand out of its cell by the rounding of its bounds.
+/// How far, as a part of a cell's size, a shape may stand out of its cell because of the rounding of its
+/// bounds.
 const ROUNDING: f64 = 1e-12;
 
 impl Lowering<'_> {
@@ -144,8 +145,9 @@ impl Lowering<'_> {
         copies
     }
 
-    /// Positive within `limit` of the middles of all cells along an axis. Ranges over a border between cells do not see
-    /// that both copies are away from it: this says so, for it jumps in the middles instead.
+    /// Positive within `limit` of the middles of all cells along an axis. Ranges over a border between cells
+    /// do not see that both copies are away from it. This field shows it, because it jumps in the middles
+    /// instead.
     fn near_middles(&mut self, p: Node, (middle, distance): (f64, f64), limit: f64, span: Span) -> Node {
         let [middle, distance, half, limit] =
             [middle, distance, 0.5, limit - 0.5 * distance].map(|number| self.constant(number));

@@ -63,8 +63,8 @@ pub struct Options {
     pub overrides: BTreeMap<String, f64>,
     /// Dimensions of those overrides that were given with a unit.
     pub dimensions: BTreeMap<String, Dimension>,
-    /// Most operations to which a file may unroll. `None` for [`MAX_NODES`], or [`NODES_PER_BYTE`] for each byte of the file
-    /// and of those that it imports if that is more.
+    /// Most operations to which a file may unroll. `None` for [`MAX_NODES`], or [`NODES_PER_BYTE`] for each
+    /// byte of the file and of those that it imports if that is more.
     pub max_nodes: Option<usize>,
     /// The method of every scene, in place of the one that it states. Defaults that depend on the method
     /// follow it.
@@ -86,8 +86,8 @@ pub struct OpenParams {
 /// Most operations to which a short file may unroll by default.
 pub const MAX_NODES: usize = 1_000_000;
 
-/// Operations for each byte of a long file by default. Lines of standard solids that are turned and moved make one for two
-/// bytes, calls of functions more, and only ranges very many.
+/// Operations for each byte of a long file by default. Lines of standard solids that are turned and moved
+/// make one for two bytes, calls of functions make more, and only ranges make very many.
 pub const NODES_PER_BYTE: usize = 4;
 
 /// The source of the standard solids.
@@ -222,7 +222,7 @@ impl<'a> Lowering<'a> {
         if !self.may_be_value(&param.name) {
             return;
         }
-        // a param that is given by another one has a value of its own, and so do ranges: nothing is fixed by them
+        // a param that is defined by another one has a value of its own, and so do ranges: they fix nothing
         let fixed = self.module.fixed.clone();
         let value = if self.is_one_number(param) {
             self.constant_expr(&param.value, "the value of a param")
@@ -281,7 +281,7 @@ impl<'a> Lowering<'a> {
         let Some((unit, text)) = &param.unit else { return true };
         let name = &param.name;
         let Some(dimension) = options.dimensions.get(name) else {
-            // a range tells which unit is meant
+            // a range shows which unit is meant
             if unit.factor != 1.0 && param.value != 0.0 && param.range.is_none() {
                 let si = unit.dimension.unit().unwrap_or("in SI units");
                 let message =

@@ -9,8 +9,8 @@ use crate::syntax::ast::{Function, Name};
 /// Names with a meaning of their own. [`TIME`] can be given another one.
 pub(super) const RESERVED: [&str; 5] = ["x", "y", "z", TIME, "pi"];
 
-/// The name of the time, unless a file in which nothing moves gives it to a param, a value, a parameter of a function or
-/// the variable of a fold.
+/// The name of the time, unless a file in which nothing moves gives it to a param, a value, a parameter of a
+/// function or the variable of a fold.
 pub(super) const TIME: &str = "t";
 
 /// What a name stands for.
@@ -46,8 +46,8 @@ impl<'a> Global<'a> {
 /// The items of one text.
 type Table<'a> = HashMap<String, Global<'a>>;
 
-/// The items of all texts. Those of a file shadow those of the prelude, but not inside the prelude itself; files see one
-/// another through their imports alone.
+/// The items of all texts. Those of a file shadow those of the prelude, but not inside the prelude itself;
+/// files see one another through their imports alone.
 #[derive(Debug, Default)]
 pub(super) struct Names<'a> {
     prelude: Table<'a>,
@@ -192,8 +192,8 @@ impl<'a> Names<'a> {
         names
     }
 
-    /// Items of the file that nothing uses: name, what it is, place. Solids are what a file is for, so they
-    /// are never unused.
+    /// Unused items of the file: name, kind, place. Solids are the purpose of a file, so they are never
+    /// unused.
     pub fn unused(&self) -> Vec<(String, &'static str, Span)> {
         let mut unused: Vec<_> = self
             .file

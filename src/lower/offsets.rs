@@ -1,7 +1,7 @@
-//! `.offset(d)` and `.distance()`: a shape made anew from the distances of its parts.
+//! `.offset(d)` and `.distance()`: a shape rebuilt from the distances of its parts.
 //!
-//! The value of R₀ is no distance, and grows faster than one beyond an edge. So not ω of the whole is moved but that of each
-//! part, and the parts are joined as before: faces move by d, and edges stay sharp.
+//! The value of R₀ is not a distance, and grows faster than one beyond an edge. So ω of each part is moved
+//! instead of ω of the whole, and the parts are joined as before: faces move by d, and edges stay sharp.
 
 use rustc_hash::FxHashMap;
 

@@ -16,7 +16,7 @@ use crate::syntax::ast::{Expr, Logic};
 /// The most corners of a polygon: all pairs of edges are looked at.
 const MOST_CORNERS: usize = 10_000;
 
-/// Cosine of the turn at corners that are those of chords of a curve: 15°.
+/// Corners count as those between chords of a curve up to this turn (cosine of 15°).
 const SMOOTH: f64 = 0.965_925_826_289_068_3;
 
 /// Sines below this are those of rounded angles.
@@ -81,7 +81,7 @@ impl Lowering<'_> {
     pub fn enclosed(&mut self, outline: Vec<Point>, span: Span) -> Node {
         let count = outline.len();
         let order = |a: &usize, b: &usize| outline[*a].partial_cmp(&outline[*b]).unwrap_or(Ordering::Equal);
-        // the leftmost corner and the rightmost one: edges from there go on to the left and to the right
+        // the leftmost corner and the rightmost one: edges from there continue to the left and to the right
         let first = (0..count).min_by(order).unwrap_or(0);
         let second = (0..count).max_by(order).unwrap_or(0);
         let corners: Vec<Point> = (0..=count).map(|i| outline[(first + i) % count]).collect();
@@ -114,9 +114,9 @@ impl Lowering<'_> {
         )
     }
 
-    /// The field of a part of the formula, and its first edge; the whole formula goes round. Parts that meet at a corner of
-    /// less than [`SMOOTH`] are joined by the least or the greatest of both: along the chords of a curve, R₀ of many fields
-    /// that are nearly equal would be far from the distance.
+    /// The field of a part of the formula, and its first edge; the whole formula goes round. Parts that meet
+    /// at a corner of less than [`SMOOTH`] are joined by the least or the greatest of both: along the chords
+    /// of a curve, R₀ of many fields that are nearly equal would be far from the distance.
     fn outlined(
         &mut self,
         (formula, is_whole): (&Chain, bool),
@@ -237,10 +237,10 @@ fn whole(corner: &impl Fn(usize) -> Point, opposite: usize, count: usize) -> Cha
     joined(Logic::And, [chain(corner, 0, opposite), chain(corner, opposite, count)])
 }
 
-/// The formula of the edges from one corner to a later one. The first edge and the last one go on for ever, so that
-/// the chain parts the plane in two. At a corner of its hull it falls into two such chains (Dobkin, Guibas,
-/// Hershberger and Snoeyink 1988), which are joined by *and* where the outline turns left and by *or* where it turns
-/// right.
+/// The formula of the edges from one corner to a later one. The first edge and the last one have no end, so
+/// that the chain divides the plane in two. At a corner of its hull it splits into two such chains (Dobkin,
+/// Guibas, Hershberger and Snoeyink 1988), which are joined by *and* where the outline turns left and by *or*
+/// where it turns right.
 fn chain(corner: &impl Fn(usize) -> Point, from: usize, to: usize) -> Chain {
     if to - from == 1 {
         return Chain::Edge(from);

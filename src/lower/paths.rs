@@ -27,11 +27,11 @@ pub(super) struct Spot {
 /// Which points a path has, and the words of its messages.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct PathKind {
-    /// As in "a polygon takes a list of corners".
+    /// The word for the list, as in "a polygon takes a list of corners".
     pub list: &'static str,
-    /// As in "a corner has two coordinates".
+    /// The word for a point of it, as in "a corner has two coordinates".
     pub point: &'static str,
-    /// As in "a corner of a polygon".
+    /// Both words, as in "a corner of a polygon".
     pub what: &'static str,
     /// How it is written.
     pub example: &'static str,
@@ -72,8 +72,9 @@ const ARC: PathKind = PathKind {
 };
 
 impl Lowering<'_> {
-    /// The points of a path along it, those of its pieces among them, and how many coordinates they have. Where a piece
-    /// begins at the end of the one before, the point is there once. What is no point is reported at its place.
+    /// The points of a path along it, those of its pieces among them, and how many coordinates they have.
+    /// Where a piece begins at the end of the one before, the point is listed once. Values that are no points
+    /// are reported at their places.
     pub fn spots(&mut self, path: &Value, written: &Expr, kind: &PathKind) -> Option<(Vec<Spot>, usize)> {
         let Some(members) = path.members() else {
             let span = self.user_span(written.span);
@@ -135,8 +136,8 @@ impl Lowering<'_> {
         Some(())
     }
 
-    /// `arc(a, b, c)`: from a point through another one to a third; `arc(centre, r, from, to)`: around a centre, from one
-    /// angle to another. A last argument is the tolerance.
+    /// `arc(a, b, c)`: from a point through another one to a third; `arc(centre, r, from, to)`: around a
+    /// centre, from one angle to another. A last argument is the tolerance.
     pub fn arc(&mut self, values: &[Value], arguments: &[Argument], span: Span) -> Value {
         if let Value::Number(_) = values[1] {
             return self.arc_around(values, arguments, span);

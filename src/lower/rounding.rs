@@ -1,12 +1,13 @@
 //! `.round(radius)`: the edges at which a shape's parts are joined by *and* and *or* become arcs.
 //!
-//! The value of R₀ is no distance, so no radius can be taken off it. The joints of the shape are made anew instead, from
-//! the distances of its parts: with m the least of two distances a and b, the rounded *and* is the least of m and
+//! The value of R₀ is not a distance, so no radius can be subtracted from it. Instead, the joints of the
+//! shape are rebuilt from the distances of its parts: with m the least of two distances a and b, the rounded
+//! *and* is the least of m and
 //!
 //! max(r, m) − √(max(r − a, 0)² + max(r − b, 0)²)
 //!
-//! which is m where one of both is beyond r, and the arc of radius r where none is. It is exact for planes at right angles,
-//! three of them at a corner as well. The rounded *or* is its mirror image, −and(−a, −b).
+//! which is m where one of both is beyond r, and the arc of radius r where none is. It is exact for planes at
+//! right angles, three of them at a corner as well. The rounded *or* is its mirror image, −and(−a, −b).
 
 use rustc_hash::FxHashMap;
 
@@ -17,7 +18,7 @@ use crate::diagnostic::{Code, Diagnostic, Span};
 use crate::geom::Aabb;
 use crate::ir::{self, Binary, Node, Unary};
 
-/// Distances of first order level off at so many radii.
+/// Distances of first order level off at this number of radii.
 const FARTHEST: f64 = 8.0;
 
 /// How far a rounded *or* reaches beyond both of its parts, as a part of the radius: 1 − 1/√2.
@@ -31,7 +32,7 @@ struct Radii {
     length: f64,
 }
 
-/// A part made anew.
+/// A rebuilt part.
 #[derive(Clone, Copy)]
 struct Rounded {
     field: Node,
@@ -40,8 +41,8 @@ struct Rounded {
 }
 
 impl Lowering<'_> {
-    /// The shape with round edges: `.round(radius)`, or `.round(radius, inner)` with another radius for edges that point
-    /// inwards, 0 for none.
+    /// The shape with round edges: `.round(radius)`, or `.round(radius, inner)` with another radius for edges
+    /// that point inwards, 0 for none.
     pub fn rounded_shape(&mut self, shape: Node, values: &[(Value, Span)], span: Span) -> Option<Node> {
         let radii = self.radii(values)?;
         let root = Side { node: shape, negated: false };

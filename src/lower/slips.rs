@@ -1,5 +1,5 @@
-//! What is accepted by the rules of the language and still is rarely meant: degrees written as radians, ω subtracted
-//! from ω, solids without a surface. The messages ask.
+//! Mistakes that the rules of the language accept although they are rarely meant: degrees written as radians,
+//! ω subtracted from ω, solids without a surface. The messages ask.
 
 use rustc_hash::FxHashMap;
 
@@ -55,15 +55,15 @@ impl Lowering<'_> {
         self.report(warning.help(help));
     }
 
-    /// Warns of the first operand that is the same formula as one before it. Within functions and folds this may hold for
-    /// some arguments and members only, so only what is written outside of them is looked at.
+    /// Warns of the first operand that is the same formula as one before it. Within functions and folds this
+    /// may hold for some arguments and members only, so only what is written outside of them is looked at.
     pub fn warn_of_twins(&mut self, op: Logic, operands: &[Expr], nodes: &[Node]) {
         if !self.scope.calls.is_empty() || !self.scope.locals.is_empty() {
             return;
         }
         let mut first_of: FxHashMap<Node, usize> = FxHashMap::default();
         let (mut first_twins, mut count) = (None, 0);
-        // a \ a is nothing at all, which is told otherwise
+        // a \ a contains nothing, which is reported elsewhere
         for (later, node) in nodes.iter().enumerate().skip(usize::from(op == Logic::Minus)) {
             let earlier = *first_of.entry(*node).or_insert(later);
             if earlier != later {
@@ -153,8 +153,8 @@ impl Lowering<'_> {
         );
     }
 
-    /// Whether an expression is written as a shape: a standard solid, a moved one, a solid's name, a comparison, or shapes
-    /// joined.
+    /// Whether an expression is written as a shape: a standard solid, a moved one, a solid's name, a
+    /// comparison, or shapes joined.
     fn is_shape(&mut self, expr: &Expr) -> bool {
         if expr.span.source != SourceId::File {
             return false;
@@ -322,7 +322,7 @@ fn without_sign(expr: &Expr) -> &Expr {
     if let ExprKind::Negate(inner) = &expr.kind { inner } else { expr }
 }
 
-/// Functions whose value is as large as an argument. What is large in `0.5*sin(10*t)` is no angle.
+/// Functions whose value is as large as an argument. The large number in `0.5*sin(10*t)` is no angle.
 const AS_LARGE: [&str; 8] = ["abs", "ceil", "clamp", "floor", "max", "min", "mod", "round"];
 
 /// The first number above a whole turn in an expression, and its place. Whole and half multiples of π stand for turns.

@@ -62,8 +62,8 @@ impl Lowering<'_> {
         Value::Number(self.tree(Binary::Max, &capsules, span))
     }
 
-    /// (r² − d²)/2r, with d the distance from a segment. Along and across the segment its parts are lengths of their own,
-    /// so that ranges over boxes are as narrow as those of a ball.
+    /// (r² − d²)/2r, with d the distance from a segment. Along and across the segment its parts are lengths
+    /// of their own, so that ranges over boxes are as narrow as those of a ball.
     fn tube(&mut self, [a, b]: [DVec3; 2], length: f64, radius: f64, span: Span) -> Node {
         let ahead = (b - a) / length;
         // the coordinate axis that is most across

@@ -50,7 +50,8 @@ pub fn keys(block: Option<&str>, method: Method) -> Vec<&'static str> {
     keys
 }
 
-/// Whether the fluid, the solver or the run of a scene has a key of this name, with any method, whose value is a number.
+/// Whether the fluid, the solver or the run of a scene has a key of this name, with any method, whose value
+/// is a number.
 pub fn is_key(name: &str) -> bool {
     const BLOCKS: [Option<&str>; 3] = [Some("fluid"), Some("solver"), Some("run")];
     let is_number = name != "shape" && words(name).is_empty();

@@ -2,8 +2,8 @@
 //!
 //! Each rule is an equation with a direction and a label. All rules here are *value-exact*: the result has
 //! the same value for every input, infinities and NaN included, except that a zero may change its sign (no
-//! consumer can tell: ω = ±0 is the surface). Nothing is reassociated or expanded: (x − a)² − … keeps its
-//! factored differences, whose digits an expansion would lose.
+//! consumer can see the difference: ω = ±0 is the surface). Nothing is reassociated or expanded: (x − a)² − …
+//! keeps its factored differences, whose digits an expansion would lose.
 //!
 //! Common subexpressions need no rule: interning finds them.
 
@@ -21,7 +21,7 @@ pub use simplifier::{Applied, MOST_PLACES, Uses};
 pub enum Exactness {
     /// The value at every point: all rules of this module.
     Value,
-    /// Where ω is positive, zero and negative, and no more: min for ∧, leaves that are dropped in a box.
+    /// Keeps only where ω is positive, zero and negative: min for ∧, leaves that are dropped in a box.
     ZeroSet,
 }
 

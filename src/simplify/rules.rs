@@ -156,7 +156,7 @@ fn de_morgan(s: &mut Simplifier, expr: Expr, span: Option<Span>) -> Option<Node>
     Some(if negate { s.make(Expr::Unary(Unary::Neg, result), span) } else { result })
 }
 
-/// Not for ∧ and ∨: u ∧ u = (2 − √2)·u.
+/// Does not hold for ∧ and ∨: u ∧ u = (2 − √2)·u.
 fn min_max_same(_: &mut Simplifier, expr: Expr, _: Option<Span>) -> Option<Node> {
     match expr {
         Expr::Binary(Binary::Min | Binary::Max | Binary::PlainMin | Binary::PlainMax, a, b) if a == b => {

@@ -20,10 +20,10 @@ use crate::solid::{BlockPlan, BlockStep, ColumnPlace, JoiningOperation, Piece};
 /// A function with more operations than this is divided: gcc -O3 needs time that grows faster than its length.
 pub(super) const LONGEST_FUNCTION: usize = 1500;
 
-/// Numbers that a block may keep at a time, for as many points as it has: most of a first-level cache.
+/// Greatest count of numbers that a block keeps at a time, over all its points: most of a first-level cache.
 const CACHED_BYTES: usize = 24 << 10;
 
-/// Points of a block, at least and at most.
+/// Least and greatest number of points of a block.
 const SHORTEST: usize = 32;
 const LONGEST: usize = 256;
 

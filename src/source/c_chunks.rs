@@ -1,15 +1,15 @@
 //! A long piece of arithmetic as a chain of short ones, where possible of one shape.
 //!
-//! The gradient of a union ends in sums over all its parts: thousands of operations in which a dozen repeat. They
-//! are cut where the fewest results are carried on, which is between one part and the next; pieces whose texts are
-//! equal but for their constants then share a function.
+//! The gradient of a union ends in sums over all its parts: thousands of operations in which a dozen repeat.
+//! They are cut where the fewest results are handed on, which is between one part and the next; pieces whose
+//! texts are equal but for their constants then share a function.
 
 use crate::ir::{Expr, Graph, Node};
 
 /// A piece with fewer operations than this stays whole.
 const SHORT: usize = 100;
 
-/// A cut is sought within so many operations.
+/// A cut is sought within this number of operations.
 const WINDOW: usize = 64;
 
 /// Operations of a chunk, at least.
@@ -81,7 +81,7 @@ impl<'a> PieceOf<'a> {
         piece
     }
 
-    /// What a node is computed from, beside what is computed anew wherever it is read.
+    /// The nodes from which a node is computed, without those that are computed again wherever they are read.
     fn operands(&self, node: Node) -> Vec<Node> {
         let mut found = Vec::new();
         for operand in self.graph.expr(node).operands() {
@@ -140,7 +140,8 @@ impl<'a> PieceOf<'a> {
     }
 }
 
-/// Whether a node is so cheap that every chunk computes it anew: one operation on coordinates and constants, or less.
+/// Whether a node is so cheap that every chunk computes it again: one operation on coordinates and constants,
+/// or less.
 fn is_repeated(graph: &Graph, is_input: &[bool], node: Node) -> bool {
     let is_free = |node: Node| {
         let free = matches!(

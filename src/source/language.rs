@@ -33,7 +33,8 @@ pub(super) struct Language {
     /// The root and the magnitude.
     pub root: [&'static str; 2],
     pub magnitude: [&'static str; 2],
-    /// The sign between two conditions of which one at least holds. Both are computed, so that loops stay free of branches.
+    /// The sign between two conditions of which one at least holds. Both are computed, so that loops stay
+    /// free of branches.
     pub either: &'static str,
     /// The largest whole number that is not above a number, and the nearest one, the even one of two.
     pub floor: [&'static str; 2],
@@ -282,8 +283,8 @@ fn rust_name(function: Function) -> &'static str {
     }
 }
 
-/// Shaders have all functions under the names of C. A power of negative numbers is undefined, and sin, cos and tan are of
-/// any accuracy: functions of the file itself stand for these, see `operations`.
+/// Shaders have all functions under the names of C. A power of negative numbers is undefined, and sin, cos
+/// and tan are of any accuracy: functions of the file itself stand for these, see `operations`.
 fn shader_call(function: Function, atan2: &str, operands: &[&str]) -> String {
     let operands = operands.join(", ");
     let name = match function {

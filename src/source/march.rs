@@ -1,11 +1,11 @@
-//! Solids for a ray-marcher: functions of GLSL ES 3.0 for the sign, the gradient and the range of ω, with params and time
-//! as uniforms.
+//! Solids for a ray-marcher: functions of GLSL ES 3.0 for the sign, the gradient and the range of ω, with
+//! params and time as uniforms.
 //!
-//! The range is that of the min/max twin, which has the zero set of ω and needs no roots. A piece of a ray over which it
-//! does not hold zero meets no surface, however thin the solid is.
+//! The range is that of the min/max twin, which has the zero set of ω and needs no roots. A piece of a ray
+//! over which it does not hold zero meets no surface, however thin the solid is.
 //!
-//! Invariant: a range holds all values of the twin over its box, but for rounding: numbers are in `f32` and ends are not
-//! rounded outwards, except where functions of the shader language may be off by more.
+//! Invariant: a range holds all values of the twin over its box, but for rounding: numbers are in `f32` and
+//! ends are not rounded outwards, except where functions of the shader language may be off by more.
 
 use super::operations::Names;
 use super::program::{Program, Question};
@@ -83,7 +83,7 @@ fn body(file: &File<'_>, made: &mut Marched) -> Result<Call, SourceError> {
     Ok(Call { prefix: prefix.to_string(), rest })
 }
 
-/// The functions of all bodies together. Without any there is nothing anywhere.
+/// The functions of all bodies together. Without bodies, space is empty everywhere.
 fn join(calls: &[Call], text: &mut String) {
     let each = |name: &str, first: &str| {
         calls
@@ -183,7 +183,7 @@ enum Text {
 }
 
 impl Text {
-    /// As a range.
+    /// The value as a range.
     fn wide(&self) -> String {
         match self {
             Self::Constant(text, _) | Self::Number(text) => format!("vec2({text})"),
@@ -242,7 +242,7 @@ fn binary(op: Binary, (i, a): (Node, &Text), (j, b): (Node, &Text)) -> String {
                 format!("{} + {}", a.wide(), b.wide())
             }
         },
-        // what makes results beyond all bounds no numbers is a difference of equal numbers
+        // the result is no number beyond all bounds because equal numbers are subtracted
         Binary::Sub if i == j => "vec2(0.0)".into(),
         Binary::Sub => match b {
             Text::Constant(number, _) | Text::Number(number) => format!("{} - {number}", a.wide()),

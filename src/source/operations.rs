@@ -125,8 +125,9 @@ power = pow(abs(u), v)
 value = pick(u < {0}, pick(whole, pick(odd, -power, power), sqrt(u)), power)
 ";
 
-/// Sine and cosine of what is left of u without its quarter turns, whose number is k, in single precision: Cody and Waite's
-/// reduction in three parts, exact for |u| below 10⁴, and the polynomials of Moshier's Cephes library.
+/// Sine and cosine of what is left of u without its quarter turns, whose number is k, in single precision:
+/// Cody and Waite's reduction in three parts, exact for |u| below 10⁴, and the polynomials of Moshier's
+/// Cephes library.
 const QUARTER: &str = "k = floor(u * {0.6366197723675814} + {0.5})
 r = ((u - k * {1.5703125}) - k * {0.0004837512969970703125}) - k * {7.54978995489188216e-8}
 square = r * r

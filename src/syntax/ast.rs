@@ -31,7 +31,7 @@ pub enum Item {
 #[derive(Debug, Clone, PartialEq)]
 pub struct Import {
     pub name: Name,
-    /// As it is written, without the quotes.
+    /// The path as it is written, without the quotes.
     pub path: String,
     /// The path with its quotes.
     pub span: Span,
@@ -196,7 +196,7 @@ pub enum Logic {
 }
 
 impl Logic {
-    /// As it is written.
+    /// The word as it is written.
     pub fn word(self) -> &'static str {
         match self {
             Self::And => "and",

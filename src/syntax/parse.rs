@@ -18,7 +18,7 @@ const DEEPEST_NESTING: usize = 200;
 /// [`DEEPEST_NESTING`] in debug builds.
 const STACK_BYTES: usize = 32 << 20;
 
-/// Parses a text. Items that fit the grammar are returned even if others do not; the messages tell which do
+/// Parses a text. Items that fit the grammar are returned even if others do not; the messages say which do
 /// not.
 pub fn parse(source: &Source) -> (Ast, Vec<Diagnostic>) {
     if source.text.len() > Source::MAX_LEN {

@@ -1,5 +1,5 @@
-//! Mistakes that deserve better words than a list of what the grammar would accept: most of them are the habits of
-//! another language.
+//! Mistakes that deserve a better message than a list of what the grammar would accept: most of them are
+//! habits from another language.
 
 mod heads;
 mod units;

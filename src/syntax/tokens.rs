@@ -1,7 +1,7 @@
 //! The tokens of a text that fits the grammar, comments included, with the place of each in the grammar.
 //!
-//! The grammar says where words, numbers and operators are. What stands between them can only be white space, comments and
-//! punctuation of one character.
+//! The grammar says where words, numbers and operators are. What stands between them can only be white space,
+//! comments and punctuation of one character.
 
 use std::collections::{HashMap, HashSet};
 

@@ -63,7 +63,7 @@ fn symbol(rounding: Rounding) -> &'static str {
     }
 }
 
-/// Tells the linker where the functions are.
+/// Registers the addresses of the functions with the linker.
 pub(in crate::codegen) fn register(linker: &mut JITBuilder) {
     linker.symbol(symbol(Rounding::Nearest), find_range as *const u8);
     linker.symbol(symbol(Rounding::Upward), find_range_to_nearest as *const u8);

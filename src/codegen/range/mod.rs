@@ -483,7 +483,7 @@ impl Ranges<'_, '_> {
     }
 
     /// Where a slab has its vertex, halfway between its roots, in both lanes. Where rounding moves it, by d,
-    /// also d² in the lane of the value there, which misses the extreme value by so much.
+    /// also d² in the lane of the value there, which misses the extreme value by that much.
     fn vertex(&mut self, first: Affine, second: Affine, at_vertex: BoundLane) -> (Value, Option<Value>) {
         // the root of slope·e ± offset is ∓slope·offset
         let sign = |affine: Affine| if affine.minus { affine.slope } else { -affine.slope };

@@ -1,8 +1,8 @@
 //! Sine and cosine in `f64`, by the ways of `libm::sin` and `libm::cos` for nearly all arguments.
 //!
-//! `libm` goes other ways for some: it reduces in more steps where much cancels, and cuts quadrants at numbers that are a
-//! little beyond odd multiples of π/4. These arguments, one in 1000 of those up to 100, are recognised by what remains
-//! of them; so are those above 50 000, infinity and NaN.
+//! `libm` goes other ways for some: it reduces in more steps where much cancels, and cuts quadrants at
+//! numbers that are a little beyond odd multiples of π/4. These arguments, one in 1000 of those up to 100,
+//! are recognised by what remains of them; so are those above 50 000, infinity and NaN.
 
 use cranelift_codegen::ir::condcodes::FloatCC;
 use cranelift_codegen::ir::{InstBuilder, Value};
@@ -41,7 +41,8 @@ const COSINE: [f64; 6] = [
     -1.13596475577881948265e-11,
 ];
 
-/// The magnitude of an argument less the nearest multiple of π/2. Its sign comes back at the end: sine is odd, cosine even.
+/// The magnitude of an argument less the nearest multiple of π/2. Its sign comes back at the end: sine is
+/// odd, cosine even.
 struct Reduced {
     /// What remains, |y| ≤ π/4, and what it is too large or too small by.
     y: Value,

@@ -117,8 +117,8 @@ fn emit(
     builder.seal_all_blocks();
 }
 
-/// The functions of the mathematical library, in each lane. The lanes wait in memory: the vector would be saved before it
-/// is known whether there is anything to call.
+/// The functions of the mathematical library, in each lane. The lanes wait in memory: the vector would be
+/// saved before it is known whether there is anything to call.
 fn call_by_lanes(
     builder: &mut FunctionBuilder<'_>,
     (precision, wanted): (Precision, Wanted),

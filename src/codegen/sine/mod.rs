@@ -5,9 +5,9 @@
 //! K. C. Ng's fdlibm, which is what `libm` computes, and chosen by quadrant. Sine and cosine of one argument share all
 //! but the choice.
 //!
-//! These instructions are functions of their own, compiled once in a process or an object file, and programs call them.
-//! In place they would be no faster, but the program of a gyroid would take five times as long to compile, and meshing compiles many
-//! that it uses for a few cells only.
+//! These instructions are functions of their own, compiled once in a process or an object file, and programs
+//! call them. In place they would be no faster, but the program of a gyroid would take five times as long to
+//! compile, and meshing compiles many that it uses for a few cells only.
 //!
 //! `double` and `single` say which arguments they leave to `libm`. It is called for a vector that holds one of them.
 

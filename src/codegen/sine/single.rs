@@ -1,8 +1,8 @@
 //! Sine and cosine in `f32`, by the ways of `libm::sinf` and `libm::cosf`, which compute in `f64`.
 //!
-//! Each half of a vector is as wide as a whole one in `f64`. Arguments up to 9π/4 are reduced in one step, others in two.
-//! Rare are those beside odd multiples of π/4, where `libm` cuts quadrants at the nearest number in `f32`, those above
-//! 4 · 10⁸, infinity and NaN.
+//! Each half of a vector is as wide as a whole one in `f64`. Arguments up to 9π/4 are reduced in one step,
+//! others in two. Rare are those beside odd multiples of π/4, where `libm` cuts quadrants at the nearest
+//! number in `f32`, those above 4 · 10⁸, infinity and NaN.
 
 use cranelift_codegen::ir::condcodes::FloatCC;
 use cranelift_codegen::ir::{Endianness, InstBuilder, MemFlagsData, Value, types};

@@ -6,14 +6,14 @@ use cranelift_codegen::isa::CallConv;
 use crate::ir::UnaryFunction;
 use crate::precision::Precision;
 
-/// Which of the two are asked for of one argument.
+/// Which of the two are wanted for one argument.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Hash)]
 pub struct Wanted {
     pub sine: bool,
     pub cosine: bool,
 }
 
-/// What they are, as far as they are asked for.
+/// Their values, as far as they are wanted.
 #[derive(Debug, Clone, Copy)]
 pub struct Waves {
     pub sine: Option<Value>,

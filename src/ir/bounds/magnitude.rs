@@ -19,7 +19,7 @@ use crate::precision::Precision;
 /// within as many seconds of the beginning.
 const REACH: f64 = 1e4;
 
-/// Ranges up to this size say themselves how large a node is; larger ones may have overflowed.
+/// Ranges up to this size show how large a node is; larger ones may have overflowed.
 const TRUSTED: f64 = 1e290;
 
 /// Upper bounds of log₂ of the magnitudes of a graph's nodes in a box; ∞ where nothing is known.

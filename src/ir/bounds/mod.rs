@@ -1,4 +1,4 @@
-//! What is certain of the values of a graph over a box: ranges, magnitudes, rounding errors.
+//! What is certain about the values of a graph over a box: ranges, magnitudes, rounding errors.
 
 pub(in crate::ir) mod choice;
 pub mod error;

@@ -95,9 +95,10 @@ impl<'a> Region<'a> {
     }
 }
 
-/// The points to which something is restricted: where no node that is not a number, and divides another, is nearer to 0
-/// than `least_divisor`, roots are those of numbers that are not negative, and no value of a function of the library
-/// is larger than `largest_call`.
+/// The points to which something is restricted. They fulfil three conditions:
+/// - no divisor is nearer to 0 than `least_divisor`, unless it is a constant;
+/// - no root is taken of a negative number;
+/// - no value of a function of the library is larger than `largest_call`.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Limits {
     pub least_divisor: f64,
@@ -216,8 +217,8 @@ fn is_number(graph: &Graph, node: Node) -> bool {
     matches!(graph.expr(node), Expr::Constant(_) | Expr::Parameter(_))
 }
 
-/// Reads a node as slope · (another node) + offset; only slopes ±1, for which the rounding of the written sum
-/// is that of the written sum. Anything else is 1 · itself.
+/// Reads a node as slope · (another node) + offset; only slopes ±1, for which the rounding is that of the
+/// written sum. Anything else is 1 · itself.
 fn affine(graph: &Graph, node: Node) -> (Node, Affine) {
     let with = |slope, offset, minus| Affine { slope, offset, minus };
     let number = |node| is_number(graph, node);

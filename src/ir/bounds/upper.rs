@@ -1,4 +1,4 @@
-//! Numbers that are bounds from above: every operation rounds up, and what is unknown stays unknown (∞).
+//! Numbers that are bounds from above: every operation rounds up, and unknown numbers stay unknown (∞).
 
 use crate::interval::Interval;
 

@@ -161,8 +161,8 @@ pub fn factor(value: Interval, y: Interval, within: Interval) -> Option<Interval
     }
 }
 
-/// a/b = value. Where b may be zero the quotient is infinite, or 0 by definition; where b is infinite the quotient is 0,
-/// whatever a is.
+/// a/b = value. Where b may be zero the quotient is infinite, or 0 by definition; where b is infinite the
+/// quotient is 0, whatever a is.
 fn quotient(op: Binary, value: Interval, a: Interval, b: Interval) -> Option<[Interval; 2]> {
     if op == Binary::DivOrZero && b.contains(0.0) {
         return Some([a, b]);

@@ -1,4 +1,4 @@
-//! All nodes of a graph: values forwards, what they leave of their operands backwards.
+//! All nodes of a graph: forwards their values, backwards what these leave of the operands.
 
 use std::cell::RefCell;
 
@@ -41,7 +41,7 @@ struct Operand {
     needed: bool,
 }
 
-/// What is asked of a formula.
+/// The question about a formula.
 #[derive(Debug, Clone, Copy)]
 pub struct Wanted<'a> {
     /// Time, and the numbers that the formula takes. Its space is not used.
@@ -56,7 +56,8 @@ pub(super) struct Scratch {
     pub values: Vec<Interval>,
     /// Whether a node may be undefined somewhere.
     pub may_fail: Vec<bool>,
-    /// Whether a node may be infinite somewhere. What is read from outside is finite, even if nothing bounds it.
+    /// Whether a node may be infinite somewhere. Values that are read from outside are finite, even if
+    /// nothing bounds them.
     pub may_be_infinite: Vec<bool>,
     pub slopes: Vec<[Interval; 3]>,
     pub linear: Vec<[Interval; 4]>,
@@ -155,7 +156,7 @@ impl Contractor {
             for &Operand { node, needed } in &self.operands[i] {
                 let is_unknown = may_fail[node.index()];
                 fails |= is_unknown;
-                // an operand that is undefined where the node is not says nothing of the node
+                // an operand that is undefined where the node is defined says nothing about the node
                 is_open |= is_unknown && !needed;
                 reads_infinity |= infinite(node);
             }
@@ -170,7 +171,7 @@ impl Contractor {
             let value = match (found.range, is_open) {
                 (Some(range), false) => range,
                 (None, false) if self.needed[i] => return None,
-                // undefined where nobody asks for it, or made of what is undefined: nothing is known
+                // undefined where its value does not matter, or made of something undefined: nothing is known
                 (None, false) | (Some(_) | None, true) => Interval::ALL,
             };
             let value = match choices.next_if(|choice| choice.node().index() == i) {

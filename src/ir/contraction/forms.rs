@@ -1,4 +1,4 @@
-//! The linear forms in a graph: their coefficients, what is found of them, and what others tell of them.
+//! The linear forms in a graph: their coefficients, what is found of them, and what follows from others.
 
 use super::contractor::{Contractor, Scratch};
 use super::linear::{LinearForm, LinearProgram, ZERO, plus};
@@ -24,7 +24,8 @@ pub fn collect(contractor: &Contractor, nodes: &[Node], scratch: &mut Scratch, o
     }
 }
 
-/// What forms with known ranges tell of other forms, the `nodes` of a graph: for the next pass over it.
+/// What follows from forms with known ranges for other forms, the `nodes` of a graph: for the next pass over
+/// it.
 pub fn bound(
     contractor: &Contractor,
     nodes: &[Node],

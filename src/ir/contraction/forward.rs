@@ -195,8 +195,8 @@ impl Squared for Interval {
     }
 }
 
-/// aᵇ. A negative base has a power only where the exponent is whole, or if it is infinite: (−∞)^0.1 is ∞. So it may have at
-/// 0 if the exponent is negative: (−0)^−1 is −∞.
+/// aᵇ. A negative base has a power only where the exponent is whole, or if it is infinite: (−∞)^0.1 is ∞. So
+/// it may have at 0 if the exponent is negative: (−0)^−1 is −∞.
 fn general_power(a: Interval, b: Interval) -> Numbers {
     let whole = b.lo == b.hi && b.lo.fract() == 0.0;
     let may_be_whole = whole || b.lo != b.hi;

@@ -8,8 +8,8 @@ use crate::geom::Aabb;
 use crate::ir::bounds::range::Region;
 
 impl Contractor {
-    /// Cuts off parts of a box where the formula is not positive. With `found` it also tells what it has found
-    /// of the linear forms in the formula.
+    /// Cuts off parts of a box where the formula is not positive. With `found` it also passes on what it has
+    /// found of the linear forms in the formula.
     pub fn contract(
         &self,
         wanted: &Wanted<'_>,

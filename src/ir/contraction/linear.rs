@@ -104,8 +104,8 @@ impl LinearProgram {
         }
     }
 
-    /// The values of slopes·p, computed with a number of this magnitude added. `None` if nothing is known that the
-    /// box does not know.
+    /// The values of slopes·p, computed with a number of this magnitude added. `None` if this adds nothing to
+    /// the box.
     pub fn range(&self, slopes: [Interval; 3], offset: f64) -> Option<Interval> {
         if !is_turned(&LinearForm::new(slopes, Interval::ALL, offset)) {
             return None;
@@ -176,14 +176,14 @@ fn is_smaller(now: &Aabb, before: &Aabb) -> bool {
     (0..3).any(|axis| now.size()[axis] < 0.99 * before.size()[axis])
 }
 
-/// Whether a form depends on more than one coordinate. The others are known to the box.
+/// Whether a form depends on more than one coordinate. Other forms are already part of the box.
 fn is_turned(form: &LinearForm) -> bool {
     let is_known = form.slopes.iter().all(|slope| slope.lo.is_finite() && slope.hi.is_finite());
     is_known && form.slopes.iter().filter(|&&slope| slope != ZERO).count() > 1
 }
 
-/// The sides of the box in the order +x, +y, +z, −x, −y, −z, then both sides of each form. They take the place of others
-/// that are not needed any more.
+/// The sides of the box in the order +x, +y, +z, −x, −y, −z, then both sides of each form. They replace
+/// others that are no longer needed.
 fn constraints(forms: &[&LinearForm], space: &Aabb, mut out: Vec<Constraint>) -> Vec<Constraint> {
     out.clear();
     out.reserve(6 + 2 * forms.len());

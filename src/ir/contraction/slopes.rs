@@ -31,7 +31,7 @@ type Slopes = [Interval; 3];
 
 impl Contractor {
     /// Cuts off what the formula's derivatives exclude. It pays in boxes that are small on the scale of the
-    /// formula. `forms` receives what they say of the distance from an origin.
+    /// formula. `forms` receives what they say about the distance from an origin.
     pub fn contract_by_slopes(
         &self,
         wanted: &Wanted<'_>,
@@ -60,7 +60,7 @@ impl Contractor {
     }
 }
 
-/// Cuts off what the derivatives exclude. `forms` receives what they say of p − `origin`, so that several
+/// Cuts off what the derivatives exclude. `forms` receives what they say about p − `origin`, so that several
 /// formulas can be solved together.
 fn contract(
     contractor: &Contractor,
@@ -241,7 +241,8 @@ fn binary(op: Binary, (a, da): (Interval, Slopes), (b, db): (Interval, Slopes), 
     }
 }
 
-/// The derivatives of 1 − u/√(u² + v²), which are −v²/(u² + v²)^(3/2) and u·v/(u² + v²)^(3/2). `None` if both may vanish.
+/// The derivatives of 1 − u/√(u² + v²), which are −v²/(u² + v²)^(3/2) and u·v/(u² + v²)^(3/2). `None` if both
+/// may vanish.
 fn slopes_of_weight(u: Interval, v: Interval) -> Option<[Interval; 2]> {
     let squares = u.square() + v.square();
     let cubes = squares * squares.sqrt();

@@ -22,8 +22,8 @@ use crate::ir::derived::sign::SignRule;
 use crate::ir::graph::{Axis, Expr, Graph, Node};
 use crate::ir::op::{Binary, Unary};
 
-/// How far a point is moved off a singular place of a leaf, relative to the leaf's value and to the coordinates. Second
-/// derivatives grow with its inverse, and lose as many digits.
+/// How far a point is moved off a singular place of a leaf, relative to the leaf's value and to the
+/// coordinates. Second derivatives grow with the inverse of this distance, and lose as many digits.
 const STEP: f64 = 1e-6;
 const RELATIVE_STEP: f64 = 2.5e-7;
 

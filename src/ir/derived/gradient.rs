@@ -23,10 +23,11 @@ pub fn gradient_and_rate(graph: &mut Graph, root: Node) -> [Node; 4] {
     partials_within(graph, root, 0)
 }
 
-/// How deeply choices may be nested for what they leave out to be left out of the gradient as well.
+/// How deeply choices may be nested if the operands that they leave out are to be left out of the gradient as
+/// well.
 const DEEPEST_CHOICE: usize = 12;
 
-/// The partial derivatives of a root inside so many choices.
+/// The partial derivatives of a root inside the given number of choices.
 fn partials_within(graph: &mut Graph, root: Node, choices: usize) -> [Node; 4] {
     let cone = graph.cone(root);
     let depends = depends_on_coordinates(graph, &cone);

@@ -1,10 +1,11 @@
 //! Motion without deformation, read off a formula.
 //!
-//! A solid that is moved and turned has x, y and z in its formula only through linear functions of them, whose
-//! coefficients depend on time: x cos 2πt + y sin 2πt. Each is the distance from a plane, times a factor. If one rotation
-//! and one translation bring all of these planes from where they are at the time 0 to where they are now, they bring the
-//! solid there. With the velocity v(p) = v₀ + ω × p a plane n·p + o that the solid carries along has n' = ω × n and
-//! o' = −n·v₀. This is known of a turning cylinder, too, although its surface stays where it is.
+//! A solid that is moved and turned has x, y and z in its formula only through linear functions of them,
+//! whose coefficients depend on time: x cos 2πt + y sin 2πt. Each is the distance from a plane, times a
+//! factor. If one rotation and one translation bring all of these planes from where they are at the time 0 to
+//! where they are now, they bring the solid there. With the velocity v(p) = v₀ + ω × p a plane n·p + o that
+//! the solid carries along has n' = ω × n and o' = −n·v₀. This is known of a turning cylinder, too, although
+//! its surface stays where it is.
 
 use glam::{DMat3, DQuat, DVec3};
 
@@ -118,8 +119,8 @@ impl RigidMotion {
         (is_turn && self.at_start.iter().zip(&now).all(is_one)).then_some(placement)
     }
 
-    /// How the solid moves at a time, s; `None` if it is deformed, or if its planes do not tell how it moves along its
-    /// surface: those of a half-space, or of a prism without ends that tilts.
+    /// How the solid moves at a time, s; `None` if it is deformed, or if its planes do not determine how it
+    /// moves along its surface: those of a half-space, or of a prism without ends that tilts.
     pub fn twist(&self, time: f64) -> Option<Twist> {
         let now = self.planes(time)?;
         let rates = planes_at(&self.rates, self.count, time)?;
@@ -221,7 +222,7 @@ impl Frame {
         }
     }
 
-    /// The translation, in the directions in which the planes tell it.
+    /// The translation, in the directions in which the planes determine it.
     fn translation(&self, start: &[Plane], now: &[Plane], rotation: DMat3) -> DVec3 {
         let mut translation = DVec3::ZERO;
         for (&(k, length), &axis) in self.chosen.iter().zip(&self.axes) {
@@ -271,7 +272,8 @@ mod tests {
         }
     }
 
-    /// A body that has just set out has moved by less than the rounding of its planes, of which one goes through the origin.
+    /// A body that has just set out has moved by less than the rounding of its planes, of which one goes
+    /// through the origin.
     #[test]
     fn the_first_steps_of_a_motion_are_found() {
         for speed in [3, 4, 5, 7] {
@@ -307,7 +309,7 @@ mod tests {
                 }
             }
         }
-        // how these move along their surfaces, nobody knows
+        // how these move along their surfaces is unknown
         for text in ["x <= t", "(x^2 + y^2 <= 1).rotate_x(t)", "sphere(1 + t)", "sphere(1) and x <= t"] {
             assert!(motion(&solid(text)).twist(0.5).is_none(), "{text}");
         }

@@ -39,8 +39,8 @@ impl SignRule {
         }
     }
 
-    /// The positive constant with which a node multiplies the operand that it has the sign of, see [`SignRule::Same`]; 1 for
-    /// all other nodes.
+    /// The positive constant with which a node multiplies the operand that it has the sign of, see
+    /// [`SignRule::Same`]; 1 for all other nodes.
     pub fn factor(graph: &Graph, node: Node) -> f64 {
         let Self::Same(operand) = Self::of(graph, node) else { return 1.0 };
         let expr = graph.expr(node);

@@ -2,7 +2,7 @@
 //!
 //! R₀ and min/max have the same sign for every sign of their operands, so the twin has exactly the sign and
 //! the zero set of ω; in floating point too, because min and max do not round. It needs no roots, and its
-//! gradient is that of one leaf. Its value away from the surface is another one.
+//! gradient is that of one leaf. Its value away from the surface differs.
 
 use crate::geom::Aabb;
 use crate::interval::Interval;

@@ -124,7 +124,7 @@ fn jet(expr: Expr, jets: &[Jet], axes: [Jet; 4], parameters: &[f64], tables: &Ta
     }
 }
 
-/// A table bends in ways that nobody knows: its slope is one of those that it has on the stretch.
+/// The shape of a table is unknown: its slope is one of those that it has on the stretch.
 fn lookup(lookup: Lookup, place: [Jet; 3], tables: &Tables) -> Jet {
     let at = lookup.range(tables, place.map(|jet| jet.at[0]));
     let over = lookup.range(tables, place.map(|jet| jet.over[0]));

@@ -4,7 +4,7 @@
 //! Truncated polynomials are carried through the operations, and with them the running error: what the
 //! operands bring along, and ε times every product and sum that is formed. ε is 2⁻⁵³, the unit of rounding,
 //! and a little more, which covers the roundings of the bounds themselves. Constants count as exact: the
-//! shape is that of the numbers in the graph, not of those in somebody's text.
+//! shape is that of the numbers in the graph, not of those in a text.
 
 use std::collections::HashMap;
 

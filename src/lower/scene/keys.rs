@@ -27,7 +27,7 @@ const INNER: [(&str, &[&str]); 4] = [
 const DYNAMIC: &str =
     "`viscosity` is the dynamic one, that is the kinematic one times the density: water has `1e-3 Pa·s`";
 
-/// What other programs have in a block and this one has not, with what there is in its place.
+/// Keys that other programs have in a block and this one does not, each with what takes its place.
 const ABSENT: [(&str, &[&str], &str); 6] = [
     (
         "a run",

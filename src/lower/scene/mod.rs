@@ -128,7 +128,7 @@ pub struct Truth {
     pub velocity: Option<[Node; 3]>,
     /// How far along x the fluid has come on the floor of the box, m: a formula of t alone.
     pub front: Option<Node>,
-    /// The time from which on the solution holds, s.
+    /// The time, s, from which the solution holds.
     pub from: f64,
 }
 
@@ -153,7 +153,7 @@ pub struct Fluid {
     pub shape_span: Span,
     /// Which part of the shape is taken when it has room for more particles than are wanted.
     pub fill: Fill,
-    /// Number of particles; `None`: as many as fit. If no size is stated, so many particles fill the shape.
+    /// Number of particles; `None`: as many as fit. If no size is stated, this number fills the shape.
     pub particles: Option<usize>,
     /// Place of the number of particles in the text, if it is stated.
     pub particles_span: Option<Span>,
@@ -291,7 +291,7 @@ pub enum Opening {
     /// The front half of each obstacle that would hide much of the fluid.
     #[default]
     Automatic,
-    /// Nothing.
+    /// No obstacle is cut.
     None,
     /// The half of space on one side of a plane across an axis, of all obstacles.
     Half {

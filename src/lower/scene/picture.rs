@@ -49,8 +49,8 @@ impl<'a> Lowering<'a> {
         names.iter().map(name).collect()
     }
 
-    /// Reads the direction to the eye. The outer option is `None` if it is wrong, which is reported; the inner one if it is
-    /// not stated.
+    /// Reads the direction to the eye. The outer option is `None` if it is wrong, which is reported; the
+    /// inner one if it is not stated.
     fn camera(&mut self, block: &Block<'_>) -> Option<Option<DVec3>> {
         let Some((_, value)) = block.setting("camera") else { return Some(None) };
         let help = "it is the direction from the scene to the eye: write `camera: [0, -1, 0.5]`";
@@ -68,8 +68,8 @@ impl<'a> Lowering<'a> {
         Some(Some(camera))
     }
 
-    /// Reads how large the picture is. The outer option is `None` if it is wrong, which is reported; the inner one if it is
-    /// not stated.
+    /// Reads how large the picture is. The outer option is `None` if it is wrong, which is reported; the
+    /// inner one if it is not stated.
     fn zoom(&mut self, block: &Block<'_>) -> Option<Option<f64>> {
         let Some((_, value)) = block.setting("zoom") else { return Some(None) };
         let zoom = self.quantity_expr(value, Dimension::NONE, "zoom")?;

@@ -1,8 +1,9 @@
 //! Where the lines of the layout begin, and which tokens share a column.
 //!
-//! A token keeps its company: if blanks put it into the column of a like token in another line of the same paragraph, both
-//! stay in one column. A wrapped line stays under the token of an earlier line below which it stands. Columns depend on each
-//! other only to the left and upwards, so a few passes settle them all.
+//! Tokens that share a column keep sharing it: if blanks put a token into the column of a like token in
+//! another line of the same paragraph, both stay in one column. A wrapped line stays under the token of an
+//! earlier line below which it stands. Columns depend on each other only to the left and upwards, so a few
+//! passes settle them all.
 
 use std::collections::HashMap;
 
@@ -22,7 +23,7 @@ const LINES_ABOVE: usize = 50;
 #[derive(Debug, Clone, Copy)]
 enum Indent {
     Fixed(usize),
-    /// So much further in than another line.
+    /// The given number of columns further in than the given line.
     Inside(usize, usize),
     /// In the column of a token, less a width; where that is no room, in the last column.
     Under(usize, usize, usize),
@@ -141,7 +142,8 @@ fn indent(tokens: &[Token], lines: &[Line], open: &[Bracket], i: usize, around: 
     }
 }
 
-/// A line of a comment alone: below a comment at the end of a line it goes on with it, otherwise it belongs to what follows.
+/// A line of a comment alone: below a comment at the end of a line it continues that comment, otherwise it
+/// belongs to what follows.
 fn comment(tokens: &[Token], lines: &[Line], i: usize) -> Indent {
     let above = lines.last().map(|line| line.end - 1).filter(|_| tokens[i].breaks == 1);
     let goes_on = above.filter(|&last| {
@@ -152,8 +154,8 @@ fn comment(tokens: &[Token], lines: &[Line], i: usize) -> Indent {
     goes_on.map_or(Indent::AsNext, |last| Indent::Under(last, 0, 0))
 }
 
-/// The token of an earlier line under which a line stands by its first token, or by what follows its first operator, which
-/// has the width that comes second.
+/// The token of an earlier line under which a line stands by its first token, or by what follows its first
+/// operator, which has the width that comes second.
 fn under(tokens: &[Token], lines: &[Line], i: usize, above: usize, value: usize) -> Option<(usize, usize)> {
     let first = &tokens[i];
     let second = tokens.get(i + 1).filter(|next| {

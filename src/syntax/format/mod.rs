@@ -1,7 +1,8 @@
 //! The layout of a file: the same tokens and line breaks with the blanks that belong between them.
 //!
-//! Line breaks are the writer's: lines are neither joined nor wrapped, and groups stay apart by one empty line. Columns are kept
-//! where several lines share them, and wrapped lines stay under what they were put under. All else is laid out anew.
+//! Line breaks are the writer's: lines are neither joined nor wrapped, and groups stay apart by one empty
+//! line. Columns are kept where several lines share them, and wrapped lines stay under what they were put
+//! under. Everything else is laid out again.
 //!
 //! What always holds: the result has the same tree and the same comments, and formatting it again changes nothing.
 
@@ -42,7 +43,7 @@ fn meaning(ast: &Ast) -> String {
     print(ast).replace('°', "deg").replace('µ', "u").replace('²', "^2").replace('³', "^3")
 }
 
-/// What is said if the layout would change the meaning of a file. No file is known that it changes.
+/// The message if the layout would change the meaning of a file. No file is known for which it does.
 fn bug(source: &Source) -> Diagnostic {
     let message = "the file cannot be formatted without changing its meaning";
     Diagnostic::error(Code::SYNTAX, Span::new(source.id, 0, 0), message)
@@ -85,7 +86,7 @@ fn add_version(tokens: &mut Vec<Token>) {
     );
 }
 
-/// Decides where lines end: as written, but for items on one line and for what never begins a line.
+/// Decides where lines end: as written, except for items on one line and for tokens that never begin a line.
 fn breaks(tokens: &mut [Token]) {
     let mut before: Option<Kind> = None;
     // whether this part of a line stood on a line of its own

@@ -5,7 +5,8 @@ use super::super::tokens::{Begins, Kind, Powers, Token};
 /// How signs with several spellings are written.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Spelling {
-    /// As they stand, but for slips and signs that are pasted from documents: `&&` becomes `and`, `−` becomes `-`.
+    /// Words and signs as they stand, except for slips and signs that are pasted from documents: `&&` becomes
+    /// `and`, `−` becomes `-`.
     #[default]
     Written,
     /// By signs: `∧ ∨ ¬ ∖ ≤ ≥ ² ³`.
@@ -14,7 +15,7 @@ pub enum Spelling {
     Ascii,
 }
 
-/// Spells each token, and writes powers in the way that is asked for.
+/// Spells each token, and writes powers in the wanted way.
 pub(super) fn apply(tokens: &mut Vec<Token>, powers: &Powers, spelling: Spelling) {
     match spelling {
         Spelling::Written => {}

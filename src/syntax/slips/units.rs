@@ -69,8 +69,8 @@ impl Slip<'_> {
         Some(diagnostic.help(format!("write `{written}`{or}")))
     }
 
-    /// `viscosity: 1 cP }`, `1000 kg m^-3`: what follows the number is no unit, or goes on behind one, so the grammar takes
-    /// it for the next key.
+    /// `viscosity: 1 cP }`, `1000 kg m^-3`: the text behind the number is no unit, or continues behind one,
+    /// so the grammar takes it for the next key.
     pub(super) fn unit_taken_for_a_key(&self) -> Option<Diagnostic> {
         // the next word or bracket may stand on a line of its own, and a `:` behind that word
         let before = self.before();
