@@ -52,7 +52,7 @@ pub(super) fn declaration() -> clap::Command {
         if !WITHOUT_FILES.contains(&command.get_name()) {
             return command;
         }
-        // a command's own declaration of an option goes before the one that it would get
+        // a command's own declaration of an option replaces the one that it would get
         command.args(shared.iter().map(|arg| arg.clone().hide(true)))
     })
 }

@@ -72,7 +72,7 @@ pub(super) fn run(shared: &Shared, options: &Options) -> Result<(), Failure> {
     report(shared, &solid, &files, made.operations)
 }
 
-/// Refuses to replace a header that this command has not made: nobody has named it.
+/// Refuses to replace a header that this command has not made, because the user did not name it.
 fn may_replace(header: &Path) -> Result<(), Failure> {
     match std::fs::read_to_string(header) {
         Ok(text) if !text.contains(MADE) => Err(Failure::usage(format!(

@@ -9,7 +9,8 @@ use rfm::mesh::Watch;
 pub struct Deadline(pub Instant);
 
 impl Deadline {
-    /// An instant so many seconds from now; far away if that is no time that can be stated.
+    /// The instant that is the given number of seconds from now; far away if that is no time that can be
+    /// stated.
     pub fn after(seconds: f64) -> Self {
         let far = Duration::from_secs(60 * 60 * 24 * 365);
         let wait = Duration::try_from_secs_f64(seconds.max(0.0)).map_or(far, |wait| wait.min(far));

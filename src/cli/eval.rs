@@ -28,7 +28,7 @@ const BLOCK: usize = 1 << 11;
 /// Points that one thread evaluates together where each of them needs a search for the nearest point.
 const SEARCHES: usize = 8;
 
-/// So many points at a time make it worthwhile to divide space into cells before their signs are asked for.
+/// From this number of points on, it pays to divide space into cells before asking for their signs.
 const MANY_POINTS: usize = 1 << 12;
 
 pub(super) fn run(shared: &Shared, options: &Eval) -> Result<(), Failure> {
@@ -138,7 +138,7 @@ struct Rows {
     progress: Option<Progress>,
 }
 
-/// What is computed for all points of a block together; empty columns where nothing is asked for.
+/// Values that are computed for all points of a block together; columns that are not wanted are empty.
 #[derive(Default)]
 struct Columns {
     omega: Vec<f64>,

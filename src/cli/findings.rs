@@ -71,7 +71,7 @@ pub(super) fn message(diagnostic: &Diagnostic, all: &Diagnostics) -> Message {
     }
 }
 
-/// Prints messages in a form for one line each. Other forms are printed at once, in the end.
+/// Prints messages in a form with one line for each. Other forms are printed as a whole, at the end.
 pub(super) fn write(messages: &[Message], format: MessageFormat) -> Result<(), Failure> {
     let mut out = io::stdout().lock();
     match format {

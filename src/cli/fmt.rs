@@ -102,7 +102,7 @@ fn summarise(files: &[Outcome]) {
     }
 }
 
-/// Lays out one file. Tells whether its text differs from its layout.
+/// Lays out one file. Returns whether its text differs from its layout.
 fn one(shared: &Shared, options: &Fmt, path: &Path) -> Result<bool, Failure> {
     let source = input::read(path)?;
     let spelling = match (options.unicode, options.ascii) {

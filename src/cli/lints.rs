@@ -1,5 +1,5 @@
-//! Warnings about solids and scenes that are valid and most likely not meant: `rfm check` looks for all of them, editors are
-//! told of them once a text rests, and a run tells of those that its fluid would meet.
+//! Warnings about solids and scenes that are valid and most likely not meant: `rfm check` looks for all of
+//! them, editors show them after a pause in typing, and a run shows those that its fluid would meet.
 
 use super::failure::note;
 use rfm::diagnostic::{Code, Diagnostic, Diagnostics, Severity, Span};
@@ -24,10 +24,11 @@ pub(super) struct Searches {
     known: Vec<(Search, [Option<ThinPart>; 2])>,
 }
 
-/// Operations that are spent on operands without effect in all solids of a file together, at most: about a second.
+/// Maximum number of operations that are spent on operands without effect in all solids of a file together:
+/// about a second.
 const IDLE_OPERATIONS: usize = 30_000_000;
 
-/// Operations that are spent on the walls and gaps of all scenes together, at most: some seconds.
+/// Maximum number of operations that are spent on the walls and gaps of all scenes together: some seconds.
 const THIN_OPERATIONS: usize = 2_500_000_000;
 
 impl Searches {
@@ -35,7 +36,7 @@ impl Searches {
         Self { idle: IDLE_OPERATIONS, thin: THIN_OPERATIONS, cut: Vec::new(), known: Vec::new() }
     }
 
-    /// Searches that end sooner, for texts that are being written and runs that wait for them.
+    /// Searches that end sooner, for texts that are being written and for runs that wait for the result.
     pub fn short() -> Self {
         Self { idle: IDLE_OPERATIONS / 10, thin: THIN_OPERATIONS / 10, ..Self::new() }
     }
@@ -123,8 +124,8 @@ struct Subject<'a> {
 }
 
 impl<'a> Subject<'a> {
-    /// A body of a scene by its name. If this is that of a solid of the file, warnings stand at its formula, else at the place
-    /// in the scene.
+    /// A body of a scene by its name. If it is the name of a solid of the file, warnings point to its
+    /// formula, and otherwise to the place in the scene.
     fn of(program: &Program, name: &'a str, place: Span) -> Self {
         match program.module().solids.iter().find(|named| named.name == name) {
             Some(named) => Self { name, at: named.span, text: definition(program, named) },
@@ -132,8 +133,8 @@ impl<'a> Subject<'a> {
         }
     }
 
-    /// A warning at a part of the formula. What is written elsewhere, in a `let` or another solid that shares it, stands
-    /// beside the name of the solid.
+    /// A warning at a part of the formula. For a part that is written elsewhere, in a `let` or another solid
+    /// that shares it, the warning also names the solid.
     fn warning(&self, code: Code, span: Option<Span>, message: String, what: String) -> Diagnostic {
         let own = span.filter(|span| {
             self.text.is_some_and(|text| {
@@ -207,11 +208,11 @@ impl<'a> Subject<'a> {
     }
 }
 
-/// A shape, the widths, m, below which walls and gaps are told of, and the box of the scene.
+/// A shape, the widths, m, below which walls and gaps are reported, and the box of the scene.
 type Search = (Node, [f64; 2], Aabb);
 
-/// Warnings about obstacles that the particles of their scenes are too large for, and about fluids that lie in obstacles. The walls
-/// of a container are not looked at.
+/// Warnings about obstacles that the particles of their scenes are too large for, and about fluids that lie
+/// in obstacles. The walls of a container are not looked at.
 pub(super) fn of_scenes(
     engine: Engine,
     program: &Program,
@@ -225,7 +226,7 @@ pub(super) fn of_scenes(
         let experiment = match Experiment::new(program, &scene.name, engine) {
             Ok(experiment) => experiment,
             Err(Error::Diagnostics(refusal)) => {
-                // of tolerances the solids tell
+                // solids report tolerances themselves
                 found.extend(refusal.list.into_iter().filter(|refusal| refusal.code != Code::TOLERANCE));
                 continue;
             }
@@ -252,7 +253,7 @@ pub(super) fn of_scenes(
     Ok(found)
 }
 
-/// What there is to say of the place of a fluid before any of its particles is placed: it has no room, or lies outside of
+/// Messages about the place of a fluid before any of its particles is placed: it has no room, or lies outside
 /// the box, or in obstacles.
 fn of_fluid(experiment: &Experiment) -> Vec<Diagnostic> {
     let operations = |body: &Body| body.solid.graph(ProgramKind::Value).0.len();
@@ -268,9 +269,9 @@ fn of_fluid(experiment: &Experiment) -> Vec<Diagnostic> {
     found
 }
 
-/// What there is to say of the part of a fluid's shape that lies in obstacles, or outside of the container: a warning if it is
-/// large, and an error if nothing is left. Where obstacles stand in a fluid that is drawn as if they were not there, as posts in
-/// a tank do, they take less.
+/// Messages about the part of a fluid's shape that lies in obstacles or outside the container: a warning if
+/// it is large, and an error if nothing is left. Where obstacles stand in a fluid that is drawn as if they
+/// were not there, as posts in a tank do, they take less.
 fn in_obstacles(scene: &Scene, fluid: &Solid, bodies: &[Solid]) -> Vec<Diagnostic> {
     let (container, obstacles) = bodies.split_at(usize::from(scene.container.is_some()).min(bodies.len()));
     let taken_by = |bodies: &[Solid]| {
@@ -332,11 +333,11 @@ fn out_of_reach(
 /// Part of the spacing by which an obstacle may reach into the room and count as outside of it.
 const DEPTH: f64 = 0.5;
 
-/// Obstacles with more operations are not looked at for what they take of the fluid, and for whether it can meet
-/// them: that would take seconds.
+/// For obstacles with more operations it is not tested what they take of the fluid, and whether the fluid can
+/// meet them: that would take seconds.
 const MOST_OPERATIONS: usize = 2000;
 
-/// Part of a fluid's shape in obstacles from which on it is told of.
+/// A fluid gets a warning if at least this part of its shape lies in obstacles.
 const MUCH: f64 = 0.25;
 
 /// Warnings about the bodies of an experiment that its fluid would meet: places at which their formulas jump or have no
@@ -358,7 +359,8 @@ pub(super) fn of_experiment(experiment: &Experiment, searches: &mut Searches) ->
         found
             .list
             .extend(singular(&body.solid, &scene.domain, &jumps).iter().map(|place| subject.singular(place)));
-        // the walls of a container have the outside behind them, and its gaps are shown by the fluid's number
+        // behind the walls of a container is the outside, and the number of particles of the fluid shows its
+        // gaps
         if let Some(obstacle) = obstacle {
             let outside = scene.container.as_ref().and_then(|_| experiment.bodies().first());
             let solids = (&body.solid, outside.map(|outside| &outside.solid));
@@ -372,12 +374,14 @@ pub(super) fn of_experiment(experiment: &Experiment, searches: &mut Searches) ->
     found
 }
 
-/// Walls that are thinner than this part of the spacing are told of. A particle stays half a spacing away from each face:
-/// through such a wall it is nearer to those on the other side than to its own second neighbours.
+/// Walls that are thinner than this part of the spacing are reported. A particle stays half a spacing away
+/// from each face: through such a wall it is nearer to those on the other side than to its own second
+/// neighbours.
 const THIN_WALL: f64 = 0.5;
 
-/// Walls whose load a probe measures are told of below this part of the spacing. The kernels of particles before a thinner wall
-/// reach beyond it, where nothing presses back: with still water on one side loads are 5 % too large at 1.4 spacings.
+/// Walls whose load a probe measures are reported below this part of the spacing. The kernels of particles
+/// before a thinner wall reach beyond it, where nothing presses back: with still water on one side loads are
+/// 5 % too large at 1.4 spacings.
 const LOADED_WALL: f64 = 1.5;
 
 /// Walls and gaps as wide as this part of the limit are wide enough.
@@ -386,7 +390,7 @@ const ALMOST: f64 = 0.999;
 /// Scenes with more obstacles are not looked at.
 const MOST_OBSTACLES: usize = 50;
 
-/// What there is to say of the thinnest wall and the thinnest gap of an obstacle.
+/// Messages about the thinnest wall and the thinnest gap of an obstacle.
 fn too_thin(
     scene: (&Scene, f64),
     obstacle: &Obstacle,
@@ -444,7 +448,7 @@ fn rounded_down(length: f64) -> f64 {
     (length / unit * (1.0 + 1e-9)).floor() * unit
 }
 
-/// The part of the spacing below which a wall of a body, by its number, is told of.
+/// The part of the spacing below which a wall of a body, given by its number, is reported.
 fn wall_limit(scene: &Scene, number: usize) -> f64 {
     let is_loaded = scene
         .probes

@@ -96,7 +96,7 @@ fn written(arg: &Arg) -> String {
 /// Prints text that ends in a line of its own.
 fn print(text: &[u8]) -> Result<(), Failure> {
     match std::io::stdout().write_all(text) {
-        // who has read enough goes away
+        // the reader may stop early
         Err(error) if error.kind() != std::io::ErrorKind::BrokenPipe => {
             Err(Failure::usage(format!("cannot write to standard output: {error}")))
         }

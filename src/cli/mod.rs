@@ -68,11 +68,12 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>) -> ExitCode {
         Ok(arguments) => arguments,
         Err(error) => {
             if hidden {
-                // the message repeats what was written, and its own colours could not be told from it
+                // the message repeats what was written, and its own colours could not be distinguished from
+                // it
                 anstream::eprint!("{}", printable(&error.render().to_string()));
                 return ExitCode::from(2);
             }
-            // clap reports help and version as errors; printing them fails only if nobody reads
+            // clap reports help and version as errors; printing them fails only if standard output is closed
             let _ = error.print();
             if let Some(hint) = hint(&error) {
                 note(hint);
@@ -121,7 +122,8 @@ fn hint(error: &clap::Error) -> Option<String> {
     })
 }
 
-/// The command that does what one of this name does in other programs; `None` if the name is not known from there.
+/// The command that does the same as the command of this name in other programs; `None` if no other program
+/// is known to have it.
 fn elsewhere(word: &str) -> Option<&'static str> {
     Some(match word {
         "slice" | "section" | "plot" | "cut" => "check FILE --slice z=0.5",
@@ -139,8 +141,8 @@ fn elsewhere(word: &str) -> Option<&'static str> {
     })
 }
 
-/// Lets a write beyond the limit for the size of a file fail as one to a full disk does. Without this the system ends the
-/// process.
+/// Lets a write beyond the limit for the size of a file fail as one to a full disk does. Without this the
+/// system ends the process.
 fn outlive_size_limits() {
     #[cfg(unix)]
     {

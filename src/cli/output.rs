@@ -56,8 +56,8 @@ pub(super) fn write(path: &Path, fill: impl FnOnce(&mut dyn Write) -> io::Result
     Ok(())
 }
 
-/// Whether something else than a file is there, which a file must not replace: a device (`/dev/null`), a pipe, or what a
-/// command writes to, whatever that is (`/dev/stdout`).
+/// Whether the path is something that a file must not replace: a device (`/dev/null`), a pipe, or the output
+/// of the command itself (`/dev/stdout`).
 fn is_stream(path: &Path) -> bool {
     path.starts_with("/dev") || path.metadata().is_ok_and(|there| !there.is_file())
 }
@@ -101,7 +101,7 @@ pub(super) fn through(path: &Path, fill: impl FnOnce(&Path) -> Result<(), Failur
     Ok(())
 }
 
-/// Puts a text in place of a file at once. A link stays a link, and who may read the file may still do so.
+/// Puts a text in place of a file at once. A link stays a link, and the permissions of the file stay.
 pub(super) fn replace(path: &Path, text: &str) -> Result<(), Failure> {
     let failed = |e: io::Error| Failure::usage(format!("cannot write `{}`: {e}", path.shown()));
     let target = path.canonicalize().map_err(failed)?;
@@ -113,8 +113,8 @@ pub(super) fn replace(path: &Path, text: &str) -> Result<(), Failure> {
     std::fs::set_permissions(&target, permissions).map_err(failed)
 }
 
-/// Removes temporary files that killed commands have left in a folder, once for each folder. Those that another command is
-/// writing are locked, by a lock that ends with its process.
+/// Removes temporary files that killed commands have left in a folder, once for each folder. Those that
+/// another command is writing are locked, by a lock that ends with its process.
 fn remove_temporaries(folder: &Path) {
     static SEEN: Mutex<Vec<PathBuf>> = Mutex::new(Vec::new());
     let Ok(mut seen) = SEEN.lock() else { return };
@@ -126,13 +126,13 @@ fn remove_temporaries(folder: &Path) {
         let is_ours = entry.file_name().to_string_lossy().starts_with(TEMPORARY);
         let is_left = || File::open(entry.path()).is_ok_and(|file| file.try_lock().is_ok());
         if is_ours && is_left() {
-            // one that cannot be removed harms nobody
+            // one that cannot be removed does no harm
             let _ = std::fs::remove_file(entry.path());
         }
     }
 }
 
-/// A path as a message shows it: on one line, and without characters that a terminal would obey.
+/// A path as a message shows it: on one line, and without characters that control a terminal.
 pub(super) trait Shown {
     fn shown(&self) -> String;
 }
@@ -177,7 +177,7 @@ fn readable_by_others(_: &std::fs::File) -> io::Result<()> {
     Ok(())
 }
 
-/// Prints one line on standard output. If nobody reads any more the process ends quietly, as other tools do.
+/// Prints one line on standard output. If the reader is gone, the process ends quietly, as other tools do.
 pub(super) fn line(words: std::fmt::Arguments<'_>) {
     let words = words.to_string();
     if let Err(error) = writeln!(anstream::stdout(), "{}", printable(&words)) {
@@ -194,7 +194,8 @@ thread_local! {
     static KEPT: RefCell<Option<Vec<serde_json::Value>>> = const { RefCell::new(None) };
 }
 
-/// What a command does, and the documents that it would print with `--json`. They are not printed.
+/// Runs a command, and returns its result and the documents that it would print with `--json`. They are not
+/// printed.
 pub(super) fn captured<T>(command: impl FnOnce() -> T) -> (T, Vec<serde_json::Value>) {
     KEPT.set(Some(Vec::new()));
     let result = command();
@@ -238,7 +239,8 @@ fn escaped(json: &str) -> Cow<'_, str> {
     out.into()
 }
 
-/// A figure with so many digits behind the point where that is readable, otherwise as many digits in all, with an exponent.
+/// A figure with the given number of digits behind the point where that is readable; otherwise with the given
+/// number of digits in all, and an exponent.
 pub(super) fn significant(figure: f64, digits: usize) -> String {
     let size = figure.abs();
     if (1e-2..1e7).contains(&size) || size == 0.0 {

@@ -1,5 +1,5 @@
-//! Progress on standard error, never part of the output: a bar on a terminal, and elsewhere a line for every tenth of the
-//! work that takes longer than a few seconds.
+//! Progress on standard error, never part of the output: a bar on a terminal, and elsewhere a line for every
+//! tenth of the work that takes longer than a few seconds.
 
 use std::io::IsTerminal;
 use std::sync::Mutex;
@@ -98,7 +98,8 @@ impl Progress {
         anstream::eprintln!("{}: {} %{message}, about {} left", self.what, 10 * tenths, duration(left));
     }
 
-    /// The tenths that are done, if they were not told before. Those of the first seconds are not told.
+    /// The tenths that are done, if they were not reported before. Those of the first seconds are not
+    /// reported.
     fn tenths_to_tell(&self, position: u64, spent: Duration) -> Option<u64> {
         let tenths = (10 * u128::from(position)).checked_div(self.length.into()).unwrap_or(0).min(9) as u64;
         let is_new = spent >= FIRST_LINE && self.tenths.fetch_max(tenths, Ordering::Relaxed) < tenths;
@@ -106,7 +107,7 @@ impl Progress {
     }
 }
 
-/// A duration of some seconds as a person says it: `45 s`, `12 min`, `3.4 h`, `12 days`.
+/// A duration of some seconds in a readable form: `45 s`, `12 min`, `3.4 h`, `12 days`.
 pub(super) fn duration(seconds: f64) -> String {
     match seconds {
         s if s < 1.0 => "1 s".to_string(),

@@ -69,8 +69,8 @@ pub(super) fn sharp<'a>(
 /// Triangles nearer to a wall of the box than this, in its longest sides, lie on it.
 const ON_WALL: f64 = 1e-6;
 
-/// A mesh without its triangles on the walls of a box. A body that goes on behind a wall is cut off there; through glass only
-/// these cuts would be seen, and not the vessel within them.
+/// A mesh without its triangles on the walls of a box. A body that extends behind a wall is cut off there;
+/// through glass only these cuts would be seen, and not the vessel within them.
 fn open_at_walls(mesh: &Mesh, domain: &Aabb) -> Mesh {
     let margin = ON_WALL * domain.size().max_element();
     let (low, high) = (domain.min + margin, domain.max - margin);
@@ -148,7 +148,7 @@ pub(super) fn out_of_the_way(camera: &Camera, name: &str, mesh: &Mesh, samples: 
     Drawn::Hidden
 }
 
-/// A coordinate with as many digits as tell parts of a size apart.
+/// A coordinate with enough digits to distinguish parts of a size.
 fn rounded(at: f64, size: f64) -> f64 {
     let step = 10f64.powf(size.log10().floor() - 2.0);
     let found = (at / step).round() * step;
@@ -187,7 +187,8 @@ pub(super) fn described(names: &[&str], drawn: &[Drawn]) -> Vec<String> {
 mod tests {
     use super::*;
 
-    /// A wall across a box goes on behind its floor: the triangle on the floor is left out, and what only touches it stays.
+    /// A wall across a box extends behind its floor: the triangle on the floor is left out, and one that only
+    /// touches it stays.
     #[test]
     fn cuts_at_the_walls_of_a_box_are_not_of_glass() {
         let corners =

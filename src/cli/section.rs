@@ -25,7 +25,7 @@ const SOUGHT: usize = 200;
 /// Cells along the longest side of the mesh from which distances are measured.
 const CELLS_OF_DISTANCE: usize = 192;
 
-/// How far beside its plane a section is looked at, as a part of the window: less than a pixel.
+/// Distance beside its plane at which a section is tested, as a part of the window: less than a pixel.
 const BESIDE: f64 = 1e-5;
 
 /// A plane that shares more than this part of the window with a face of the solid lies within that face.
@@ -116,7 +116,7 @@ fn plot_one(
     let (field, title) = (seen.field(), seen.title.as_str());
     let warnings = Vec::from_iter(seen.warning.clone());
     if options.term {
-        // drawn to memory first, so that a reader who leaves early is no error of the drawing
+        // drawn to memory first, so that a reader that closes early does not count as an error of the drawing
         let mut drawing = Vec::new();
         let colour = std::io::stdout().is_terminal() && std::env::var_os("NO_COLOR").is_none();
         slice::terminal::draw(field, title, plane, window, 78, colour, &mut drawing)
@@ -274,7 +274,7 @@ fn plot_sheet(
     }
     let all: Vec<Diagnostic> =
         all.into_iter().flat_map(|(_, _, seen)| seen).filter_map(|seen| seen.warning).collect();
-    // a sheet of several solids may show one where it is not, as long as it shows it somewhere
+    // in a sheet of several solids, a plane may miss a solid as long as another plane shows it
     let missed = |warning: &Diagnostic| warning.code == Code::NO_SECTION;
     let is_nowhere = |solid: Span| {
         all.iter().filter(|other| missed(other) && other.primary.span == solid).count() == planes.len()
@@ -320,7 +320,8 @@ fn sought(plane: Plane, window: Window) -> impl Iterator<Item = DVec3> {
     })
 }
 
-/// If a plane lies within a face of a solid, how far beside it the section is drawn: on the side with less of the solid.
+/// If a plane lies within a face of a solid, how far beside it the section is drawn: on the side with less of
+/// the solid.
 fn out_of_a_face(solid: &Solid, plane: Plane, window: Window) -> Option<f64> {
     let aside = BESIDE * window.size().max_element();
     let step = DVec3::AXES[plane.axis.index()] * aside;
@@ -343,7 +344,7 @@ fn in_a_face(solid: &Solid, plane: Plane) -> String {
     )
 }
 
-/// What to say of a plot that shows nothing of the solid; `None` if it shows some.
+/// The message about a plot that shows nothing of the solid; `None` if it shows some.
 fn meets(solid: &Solid, plane: Plane, window: Window) -> Option<String> {
     if sought(plane, window).any(|p| solid.omega(p) > 0.0) {
         return None;
@@ -354,7 +355,7 @@ fn meets(solid: &Solid, plane: Plane, window: Window) -> Option<String> {
         Bounds::Empty => "it is empty".to_string(),
         Bounds::Unbounded => "another plane or --window may show it".to_string(),
         Bounds::Within(bounds) => {
-            // rounded, so that bounds which are proven and not exact look as they are meant
+            // rounded, because proven bounds are not exact
             let [low, high] = [bounds.min[axis], bounds.max[axis]].map(|at| (1e5 * at).round() / 1e5 + 0.0);
             format!("it lies between {0} = {low} and {0} = {high}", plane.axis.name())
         }

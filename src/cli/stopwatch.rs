@@ -17,7 +17,7 @@ pub fn processor_seconds() -> f64 {
     }
 }
 
-/// Tells how long something takes on a machine that does nothing else.
+/// Measures how long something takes on a machine that does nothing else.
 #[derive(Debug, Clone, Copy)]
 pub struct Stopwatch {
     started: Instant,

@@ -18,7 +18,7 @@ pub(super) const FOLDER: &str = "surface";
 /// The list of surfaces for ParaView.
 const LIST: &str = "surface.pvd";
 
-/// The file that tells of which frames the surfaces were made.
+/// The index that maps surfaces to the frames they were made of.
 const ORIGINS: &str = "surface.json";
 
 /// Beginning of the names of surfaces.
@@ -34,7 +34,7 @@ pub(super) fn file_name(frame: usize, ending: &str) -> String {
 pub(super) struct Origins(BTreeMap<String, String>);
 
 impl Origins {
-    /// Those that a folder tells of; none if it has no such file.
+    /// The index of a folder; empty if the folder has none.
     fn read(folder: &Path) -> Self {
         let text = std::fs::read_to_string(folder.join(ORIGINS)).unwrap_or_default();
         Self(serde_json::from_str(&text).unwrap_or_default())
@@ -45,7 +45,8 @@ impl Origins {
         self.0.insert(surface.to_string(), checksum(frame));
     }
 
-    /// Lists the surfaces, with their times in s, and tells of which frames they were made.
+    /// Writes the list of surfaces, with their times in s, and the index of the frames that they were made
+    /// of.
     pub fn write<'a>(
         &self,
         folder: &Path,

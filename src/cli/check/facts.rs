@@ -165,7 +165,7 @@ fn print_solid(solid: &Facts) {
     }
 }
 
-/// The corners of a box, with as many digits behind the point as the box is small.
+/// The corners of a box, with more digits behind the point for smaller boxes.
 fn corners(bounds: &Box3) -> [String; 2] {
     let size = (0..3).map(|i| bounds.max[i] - bounds.min[i]).fold(f64::MIN_POSITIVE, f64::max);
     let digits = (3.0 - size.log10().floor()).clamp(4.0, 12.0) as usize;

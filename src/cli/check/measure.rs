@@ -11,7 +11,8 @@ use rfm::interval::Interval;
 use rfm::mesh::{self, Grid, MeshError, ThinCells, VolumeError};
 use rfm::solid::Bounds;
 
-/// Boxes along each side of a solid in which its range is tried; one in so many may be unknown.
+/// Boxes along each side of a solid in which its range is tried; one in `MOST_UNKNOWN` of them may be
+/// unknown.
 const PROBES: u32 = 16;
 const MOST_UNKNOWN: usize = 50;
 
@@ -96,12 +97,12 @@ fn thin_cells(solid: &Solid, surface: &dyn Field, grid: &Grid, deadline: &Deadli
         ));
         return None;
     }
-    // a formula that is not a number somewhere has no such search; its volume has told of it
+    // a formula that is not a number somewhere has no such search; its volume has reported it
     mesh::thin_cells(surface, grid, deadline).ok()
 }
 
-/// Whether ranges tell anything of the solid nearly everywhere in a box. Where they do not, a search for thin
-/// parts would divide every cell to the end.
+/// Whether ranges say anything about the solid nearly everywhere in a box. Where they do not, a search for
+/// thin parts would divide every cell to the end.
 fn knows_ranges(solid: &Solid, bounds: &Aabb) -> bool {
     let size = bounds.size() / f64::from(PROBES);
     let probe = |i: u32| {

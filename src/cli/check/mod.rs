@@ -115,7 +115,8 @@ fn once(shared: &Shared, options: &Check, named: &mut Vec<PathBuf>) -> Result<()
     }
 }
 
-/// Checks one file, and adds to the document what is known of it and all messages, which are errors if it fails by findings.
+/// Checks one file, and adds to the document what is known of it and all messages, which are errors if it
+/// fails by findings.
 fn check_file(
     shared: &Shared,
     options: &Check,
@@ -236,8 +237,8 @@ fn solids(
     Ok(facts)
 }
 
-/// Whether no more solids are measured: the budget is spent, or a tenth of it has shown that there are so many solids that
-/// it would reach a tenth of them at most.
+/// Whether no more solids are measured: the budget is spent, or a tenth of it has shown that there are so
+/// many solids that it would reach a tenth of them at most.
 fn is_over(measured: usize, all: usize, elapsed: f64, budget: f64) -> bool {
     let is_hopeless = elapsed > 0.1 * budget && elapsed * all as f64 > 10.0 * budget * measured as f64;
     measured > 0 && (elapsed > budget || is_hopeless)

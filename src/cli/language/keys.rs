@@ -171,8 +171,8 @@ const PICTURE: Rows = &[
     ("glass", "", "none", "obstacles that are drawn clear, by their names"),
 ];
 
-/// What a key of a block means under a method; empty if there is no such key. `None` is the block of the scene itself, or
-/// an unknown method.
+/// What a key of a block means under a method; empty if there is no such key. `None` is the block of the
+/// scene itself, or an unknown method.
 pub(in crate::cli) fn about(block: Option<&str>, key: &str, method: Option<Method>) -> String {
     let declared = |method: Method| {
         method.info().keys.into_iter().find(|own| own.name == key && Some(own.block.name()) == block)

@@ -1,4 +1,4 @@
-//! What the words of the language mean, as editors and `rfm explain` tell it.
+//! What the words of the language mean, as editors and `rfm explain` show it.
 
 pub(super) mod keys;
 pub(super) mod page;

@@ -1,4 +1,5 @@
-//! `rfm explain WORD` and `rfm explain words`: the words of the language and the keys of scenes, from their declarations.
+//! `rfm explain WORD` and `rfm explain words`: the words of the language and the keys of scenes, from their
+//! declarations.
 
 use rfm::lower::vocabulary;
 use rfm::sph::Method;
@@ -49,7 +50,8 @@ pub(in crate::cli) fn all() -> String {
     page
 }
 
-/// What is known of one word: functions, methods and keys of this name, and what begins items. `None` if there are none.
+/// What is known of one word: functions, methods and keys of this name, and what begins items. `None` if
+/// there are none.
 pub(in crate::cli) fn of(word: &str) -> Option<String> {
     let word = word.trim_start_matches('.');
     let mut found = String::new();

@@ -1,4 +1,4 @@
-//! Names across files: where what an import offers is defined, and all places where it is used.
+//! Names across files: the definitions of what an import offers, and all places where it is used.
 
 use std::collections::HashMap;
 use std::ops::Range;
@@ -110,8 +110,8 @@ impl Workspace {
         }
     }
 
-    /// All places of the name at a byte, in this file and in all that import it. The definition comes first, and the others
-    /// in the order of files.
+    /// All places of the name at a byte, in this file and in all that import it. The definition comes first,
+    /// and the others in the order of files.
     pub fn uses(&self, uri: &Uri, document: &Arc<Document>, byte: usize) -> Option<Vec<Place>> {
         let mention = own_name(document, byte)?;
         let defined = self.definition(uri, document, byte)?;
@@ -171,8 +171,8 @@ impl Workspace {
         Ok(edits(&places, name))
     }
 
-    /// Files that may name something of a file: open ones, and those in the folders of the editor, or in that of a document
-    /// if there are none.
+    /// Files that may name something of a file: open ones, and those in the folders of the editor, or in that
+    /// of a document if there are none.
     fn files_that_may_name(&self, path: &str, word: &str, document: &Document) -> Vec<(Uri, File)> {
         let mut open: Vec<(&String, &Arc<Document>)> = self.documents.iter().collect();
         open.sort_unstable_by_key(|(uri, _)| *uri);
@@ -202,7 +202,8 @@ impl Workspace {
     }
 }
 
-/// Why a text would have other methods of shapes if what it defines at a place had another name; `None` if it would not.
+/// Why renaming the definition at a place would change which methods of shapes a text has; `None` if it would
+/// not.
 fn changes_methods(home: &Reading, place: &Range<usize>, name: &str) -> Option<String> {
     let (shape, is_here) = (Function::SHAPE, |span: Span| span.range() == *place);
     home.ast.items.iter().find_map(|item| {

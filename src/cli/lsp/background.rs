@@ -1,8 +1,9 @@
-//! Warnings that take longer than a keystroke: they are looked for in a thread of their own, once a text rests. Solids of
-//! very many operations, and those that a second does not suffice for, are left to `rfm check`.
+//! Warnings that take longer than a keystroke: they are looked for in a thread of their own, once a text
+//! rests. Solids with very many operations, and those that take longer than a second, are left to
+//! `rfm check`.
 //!
-//! Invariant: messages about a text are sent only while it is the newest one of its file. Who sends holds the lock, so that
-//! older messages never follow newer ones.
+//! Invariant: messages about a text are sent only while it is the newest one of its file. The sender holds
+//! the lock, so that older messages never follow newer ones.
 
 use std::collections::HashMap;
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -23,7 +24,7 @@ use super::reading::Encoding;
 /// A text that is not changed for so long rests.
 const REST: Duration = Duration::from_millis(400);
 
-/// Time that is spent on the solids of a text; the one at which it ends is looked at to the end.
+/// Time that is spent on the solids of a text. The solid at which it ends is still searched completely.
 const MOST_TIME: Duration = Duration::from_secs(1);
 
 /// Solids with more operations are left to `rfm check`: one of them must not take seconds.
@@ -74,7 +75,7 @@ impl Shared {
         !state.is_over && state.newest.get(text.uri.as_str()) == Some(&text.number)
     }
 
-    /// Waits until a text rests; `None` if there is nobody left to tell.
+    /// Waits until a text rests; `None` if the editor is gone.
     fn wait(&self) -> Option<Text> {
         let mut state = self.state();
         while !state.is_over {
@@ -128,7 +129,7 @@ impl Background {
         self.shared.changed.notify_one();
     }
 
-    /// Forgets the texts of a file: what is found in them is not sent from now on.
+    /// Forgets the texts of a file: what is found in them is no longer sent.
     pub fn forget(&self, uri: &Uri) {
         let mut state = self.shared.state();
         state.newest.remove(uri.as_str());
@@ -144,8 +145,8 @@ impl Drop for Background {
     }
 }
 
-/// All messages of a text with those that are found in its solids; `None` if there are none of these, or the text is not
-/// the newest any more.
+/// All messages of a text with those that are found in its solids; `None` if there are none of these, or if
+/// the text is no longer the newest.
 fn look(
     shared: &Shared,
     text: &Text,

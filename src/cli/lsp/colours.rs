@@ -1,4 +1,5 @@
-//! The colours of solids, as pictures show them. They are not written in files, so an editor shows them and cannot set them.
+//! The colours of solids, as pictures show them. They are not written in files, so an editor shows them and
+//! cannot set them.
 
 use lsp_types::{Color, ColorInformation};
 

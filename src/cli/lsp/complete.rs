@@ -32,9 +32,9 @@ fn called(signature: Signature, kind: CompletionItemKind) -> CompletionItem {
     CompletionItem { detail, ..item(signature.name, kind, &signature.about) }
 }
 
-/// What may be written at a byte, each with the word that it replaces: editors have different ideas of what a word is. They
-/// leave out what does not begin with the word that is there. Some let the user choose whether what follows the cursor is
-/// replaced too.
+/// What may be written at a byte, each with the word that it replaces: editors have different ideas of what a
+/// word is. They leave out entries that do not begin with the word that is there. Some let the user choose
+/// whether the text behind the cursor is replaced too.
 pub(super) fn at(document: &Document, byte: usize, may_choose: bool) -> Vec<CompletionItem> {
     let context = Context::at(document.text(), byte);
     let after = document.text().get(byte..).unwrap_or("");
@@ -112,8 +112,8 @@ fn names(document: &Document, byte: usize) -> Vec<CompletionItem> {
     above.filter_map(|item| defined(item, document.text())).collect()
 }
 
-/// What an import defines, if its name stands alone in front of the dot at the cursor. An import of its own is not among
-/// that: it has no meaning outside.
+/// What an import defines, if its name stands alone in front of the dot at the cursor. An import of its own
+/// is not among that: it has no meaning outside.
 fn members(document: &Document, context: &Context) -> Option<Vec<CompletionItem>> {
     let source = imported(document, context, context.owner.as_deref())?;
     let (ast, _) = syntax::parse(&source);

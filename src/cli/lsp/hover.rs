@@ -16,7 +16,7 @@ use crate::cli::language::{keys, words::comment_above};
 /// Lines of a definition that are shown.
 const MOST_LINES: usize = 12;
 
-/// Solids of more operations have no range shown: nobody waits for a hover.
+/// Solids with more operations have no range shown, because a hover must answer at once.
 const MOST_OPERATIONS: usize = 20_000;
 
 /// The words about the name at a byte, in Markdown, and its place.

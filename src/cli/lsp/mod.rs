@@ -1,9 +1,9 @@
 //! `rfm lsp`: what editors ask about files, over the Language Server Protocol on standard input and output.
 //!
-//! One thread answers one request after the other: a file is compiled again in milliseconds when it changes, so nothing is
-//! kept from one version of a text to the next. Texts are read when a request needs them, or when no message waits: of many
-//! changes that come together only the last one is read. Another thread looks for warnings that take longer, and one draws
-//! slices.
+//! One thread answers one request after the other: a file is compiled again in milliseconds when it changes,
+//! so nothing is kept from one version of a text to the next. Texts are read when a request needs them, or
+//! when no message waits: of many changes that come together only the last one is read. Another thread looks
+//! for warnings that take longer, and one draws slices.
 
 mod across;
 mod background;
@@ -134,7 +134,7 @@ fn serve(connection: &Connection) -> Result<End, Failure> {
             Message::Notification(_) | Message::Response(_) => {}
         }
     }
-    // who closes the pipe behind the last request may still read
+    // a client that closes the pipe behind the last request may still read
     server.slices.finish();
     Ok(End::InOrder)
 }
@@ -247,7 +247,7 @@ impl Refusal {
 struct Server<'c> {
     connection: &'c Connection,
     workspace: Workspace,
-    /// Texts that have not been read, one for each file at most.
+    /// Texts that have not been read, at most one for each file.
     waiting: Vec<Waiting>,
     background: Background,
     slices: Slices,
@@ -262,11 +262,11 @@ struct Waiting {
 
 impl Server<'_> {
     fn send(&self, message: Message) -> Result<(), Failure> {
-        // the editor is gone: there is nobody left to serve
+        // the editor is gone: nothing is left to do
         self.connection.sender.send(message).map_err(|_| Failure::ClosedPipe)
     }
 
-    /// The next message of the editor, which may be long in coming; `None` if it is gone. Meanwhile texts are read.
+    /// The next message of the editor; `None` if the editor is gone. While it waits, texts are read.
     fn next(&mut self) -> Result<Option<Message>, Failure> {
         loop {
             if let Ok(message) = self.connection.receiver.try_recv() {
@@ -419,7 +419,7 @@ impl Server<'_> {
 
     fn notice(&mut self, notification: Notification) -> Result<(), Failure> {
         let parameters = notification.params;
-        // what does not fit the protocol cannot be answered, as nobody waits for an answer
+        // what does not fit the protocol cannot be answered, and needs no answer
         match notification.method.as_str() {
             DidOpenTextDocument::METHOD => {
                 type Opened = <DidOpenTextDocument as lsp_types::notification::Notification>::Params;

@@ -1,7 +1,8 @@
 //! Messages from an editor on standard input, and to it on standard output.
 //!
-//! Unlike the pipes of the library, these go on after a message whose text makes no sense: its length was right, so the
-//! next one is found. It is answered as JSON-RPC says, without a number, because none could be read.
+//! Unlike the pipes of the library, these continue after a message whose text makes no sense: its length was
+//! right, so the next one is found. It is answered as JSON-RPC says, without a number, because none could be
+//! read.
 
 use std::io::{self, Write};
 use std::thread::{self, JoinHandle};

@@ -36,7 +36,7 @@ pub(super) struct Wanted {
 }
 
 impl Wanted {
-    /// Where the slice is shown: of two for one place the later one is wanted.
+    /// Where the slice is shown: if there are two for one place, the later one is wanted.
     pub fn panel(&self) -> &str {
         self.panel.as_deref().unwrap_or(self.uri.as_str())
     }

@@ -61,7 +61,8 @@ impl Encoding {
     }
 }
 
-/// The text after changes, which are made one after the other; `None` if one changes a part of a text that is not known.
+/// The text after changes, which are made one after the other; `None` if one changes a part of a text that is
+/// not known.
 pub(super) fn changed(
     text: Option<Arc<str>>,
     changes: Vec<TextDocumentContentChangeEvent>,

@@ -1,7 +1,8 @@
-//! Slices are drawn in a thread of their own, one after the other: one of a solid of many parts takes seconds, in which
-//! the editor gets all other answers.
+//! Slices are drawn in a thread of their own, one after the other: a slice of a solid with many parts takes
+//! seconds, and meanwhile the editor gets all other answers.
 //!
-//! Invariant: each request is answered once. Whoever answers takes it out of the state first, under the lock.
+//! Invariant: each request is answered once. The thread that answers first takes it out of the state, under
+//! the lock.
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
@@ -21,11 +22,11 @@ pub(super) struct Asked {
 
 #[derive(Default)]
 struct State {
-    /// In the order in which they came, one for each panel at most.
+    /// In the order in which they came, at most one for each panel.
     waiting: Vec<Asked>,
     /// What is being drawn, unless it has been answered already.
     drawn: Option<RequestId>,
-    /// `None` if there is nobody left to answer.
+    /// `None` if the editor is gone.
     send: Option<Box<dyn Fn(Response) + Send>>,
 }
 
@@ -62,7 +63,7 @@ impl Shared {
         state.unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Waits for a request to draw; `None` if there is nobody left to answer.
+    /// Waits for a request to draw; `None` if the editor is gone.
     fn next(&self) -> Option<Asked> {
         let mut state = self.wait_while(|state| state.waiting.is_empty() && state.send.is_some());
         state.send.as_ref()?;
@@ -96,7 +97,8 @@ impl Slices {
         slices
     }
 
-    /// Has a slice drawn. One that waits for the same panel would be out of date when it is seen: it is refused.
+    /// Has a slice drawn. An older request for the same panel would be out of date when it is shown, so it is
+    /// refused.
     pub fn ask(&self, asked: Asked) {
         let mut state = self.shared.state();
         let same = |other: &mut Asked| other.wanted.panel() == asked.wanted.panel();
@@ -107,7 +109,8 @@ impl Slices {
         self.shared.changed.notify_all();
     }
 
-    /// Refuses a slice that the editor does not want any more. One that is being drawn is drawn to the end, for nobody.
+    /// Refuses a slice that the editor no longer wants. One that is being drawn is drawn to the end and
+    /// discarded.
     pub fn cancel(&self, id: &RequestId) {
         self.refuse(|asked| asked == id, "the slice is not wanted any more");
     }
@@ -134,7 +137,7 @@ impl Slices {
 }
 
 impl Drop for Slices {
-    /// Nobody waits for the slice that is being drawn.
+    /// The slice that is being drawn is no longer wanted.
     fn drop(&mut self) {
         self.shared.state().send = None;
         self.shared.changed.notify_all();

@@ -55,7 +55,7 @@ fn symbol(
 ) -> DocumentSymbol {
     let (place, value) = (name.span.range(), value.range());
     let reach = place.start..value.end.max(place.end);
-    #[allow(deprecated)] // the field must be given though nobody reads it any more
+    #[allow(deprecated)] // the field must be given although it is deprecated
     DocumentSymbol {
         name: name.text.clone(),
         detail,

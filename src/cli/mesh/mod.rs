@@ -105,7 +105,8 @@ pub(super) fn run(shared: &Shared, options: &Options) -> Result<(), Failure> {
     Ok(())
 }
 
-/// Time for the search for thin parts, unless the option states it: so many seconds, or so many times that of meshing.
+/// Time for the search for thin parts, unless the option states it: the larger one of this number of seconds
+/// and this multiple of the time for meshing.
 pub(super) const LEAST_SEARCH: f64 = 10.0;
 const SEARCH_PER_MESHING: f64 = 3.0;
 
@@ -138,16 +139,16 @@ fn nothing_to_write(
     Err(Failure::Findings)
 }
 
-/// What is said of a unit that other programs take for another one.
+/// The message about a unit that other programs take for another one.
 fn unit_hint(path: &Path, options: &Options) -> &'static str {
     let is_stl = path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case(mesh::stl::FORMAT.ending));
     if is_stl && options.unit.is_none() { "; most programs read .stl as millimetres: --unit mm" } else { "" }
 }
 
-/// The rounding of vertices, as a part of a cell, that is said.
+/// If the rounding of vertices is at least this part of a cell, it is reported.
 const SEEN_ROUNDING: f64 = 1e-3;
 
-/// Says how far vertices are moved by a format that has few digits, if that is a part of a cell that can be seen.
+/// Reports how far a format with few digits moves vertices, if that is a visible part of a cell.
 fn warn_of_rounding(path: &Path, mesh: &Mesh, grid: Option<&Grid>) {
     let is_single = format::is_page(path) || format::of_path(path).is_ok_and(|format| format.single);
     let Some(cell) = grid.map(|grid| grid.spacing().min_element()).filter(|_| is_single) else { return };
@@ -231,7 +232,8 @@ fn grid(solid: &Solid, options: &Options) -> Result<Option<Grid>, Failure> {
     })
 }
 
-/// Why there is no grid of so many cells along the longest side, in the words of the flag that asks for them.
+/// Why there is no grid with the given number of cells along the longest side, in the words of the flag that
+/// asks for them.
 pub(super) fn no_grid(error: &GridError, flag: &str, cells: usize) -> Failure {
     Failure::usage(match error {
         GridError::TooManyCells(_) => {
@@ -245,7 +247,7 @@ pub(super) fn no_grid(error: &GridError, flag: &str, cells: usize) -> Failure {
     })
 }
 
-/// The mesh of a surface, without slivers if that is asked for.
+/// The mesh of a surface, without slivers if the options ask for that.
 fn meshed(solid: &Solid, surface: &dyn Field, grid: &Grid, options: &Options) -> Result<Mesh, Failure> {
     let bar = progress::bar(1000, "meshing");
     let mesh = options.method.mesh(surface, grid, &|part: f64| bar.set_position((1000.0 * part) as u64));
@@ -258,7 +260,7 @@ fn meshed(solid: &Solid, surface: &dyn Field, grid: &Grid, options: &Options) ->
     Ok(mesh)
 }
 
-/// Simplifies the mesh if that is asked for, and measures it. The quality is `None` if only `--simplify`
+/// Simplifies the mesh if the options ask for it, and measures it. The quality is `None` if only `--simplify`
 /// needed it.
 fn measured(
     mesh: &mut Mesh,
@@ -285,8 +287,8 @@ fn measured(
     Ok((options.quality.then_some(quality), found))
 }
 
-/// What hides from a grid, as a sentence without its subject: how much, where, and how many cells would
-/// show it.
+/// The parts that a grid cannot show, as a sentence without its subject: how much, where, and how many cells
+/// would show them.
 pub(super) fn hidden(thin: &ThinCells, grid: &Grid) -> String {
     let what = if thin.is_gap { "a gap" } else { "a part" };
     let how = match thin.cells_needed(grid) {

@@ -36,7 +36,7 @@ impl Tolerance {
     }
 }
 
-/// The part of a mesh's thickness from which on a tolerance is told of.
+/// Tolerances above this part of a mesh's thickness are reported.
 const COARSE: f64 = 0.2;
 
 /// Parts of the tolerance to aim at, in turn. The measure has other samples than the simplification, and some

@@ -126,7 +126,7 @@ impl EvenAxis {
         let digits = (-power(self.tick)).clamp(0.0, 12.0) as usize;
         let largest = self.low.abs().max(self.high.abs());
         let large = largest >= 1e6 || self.tick < 1e-6;
-        // as many as tell one tick from the next
+        // enough of them to distinguish one tick from the next
         let of_power = (power(largest) - power(self.tick)).clamp(1.0, 12.0) as usize;
         (0..=count).map(move |k| {
             let value = self.low + k as f64 * self.tick;

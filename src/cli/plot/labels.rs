@@ -8,8 +8,8 @@ use super::{BOTTOM, HEIGHT, LEFT, RIGHT, TOP, WIDTH};
 const SIZE: f64 = 11.0;
 const LETTER: f64 = 6.2;
 
-/// Where a label may stand beside its mark: offsets of its near edge, with the preferred ones first. The third number is
-/// the part of its width that lies left of that edge.
+/// Where a label may stand beside its mark: offsets of its near edge, with the preferred ones first. The
+/// third number is the part of its width that lies left of that edge.
 const PLACES: [(f64, f64, f64); 8] = [
     (8.0, -7.0, 0.0),
     (8.0, 14.0, 0.0),

@@ -1,4 +1,4 @@
-//! The obstacles of a saved run: their meshes, told apart, and how each of them is drawn.
+//! The obstacles of a saved run: their separate meshes, and how each of them is drawn.
 
 use std::path::{Path, PathBuf};
 
@@ -19,7 +19,7 @@ const MOST_SAMPLES: usize = 3000;
 
 /// The obstacles at the start of a run.
 pub(super) struct Bodies {
-    /// Their names; one for all if the folder does not tell them apart.
+    /// Their names; one for all if the folder does not distinguish them.
     pub names: Vec<String>,
     are_named: bool,
     meshes: Vec<Mesh>,
@@ -89,7 +89,7 @@ impl Bodies {
     }
 }
 
-/// The bodies of a file, told apart by its array `body` if there are several.
+/// The bodies of a file, distinguished by its array `body` if there are several.
 pub(super) fn bodies_of(path: &Path, count: usize) -> Result<Vec<Mesh>, Failure> {
     let failed = |error: String| Failure::usage(format!("cannot read `{}`: {error}", path.shown()));
     let file = std::fs::read(path).map_err(|error| failed(error.to_string()))?;

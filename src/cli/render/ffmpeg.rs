@@ -103,7 +103,7 @@ impl Video {
         }
     }
 
-    /// Waits for the end of the file. `fed` tells whether all pictures could be handed over.
+    /// Waits for the end of the file. `fed` says whether all pictures could be handed over.
     pub fn finish(mut self, fed: io::Result<()>) -> Result<(), Failure> {
         drop(self.pixels.take());
         let status = self.child.wait()?;

@@ -159,7 +159,7 @@ impl Target {
         Ok(())
     }
 
-    /// Writes one file. A failure that is not one of writing is what is reported.
+    /// Writes one file. A failure that is not one of writing is reported first.
     fn stream(
         &self,
         fill: impl FnOnce(&mut dyn Write, &mut Option<Failure>) -> io::Result<()>,

@@ -57,7 +57,7 @@ struct RunScene {
     /// Files of the obstacles' meshes, and for each frame the number of its mesh.
     meshes: Vec<PathBuf>,
     mesh_of: Vec<Option<usize>>,
-    /// How each body of a mesh is drawn; the only entry is for all if bodies are not told apart.
+    /// How each body of a mesh is drawn; the only entry is for all if bodies are not distinguished.
     drawn: Vec<Drawn>,
     domain: Aabb,
     radius: f64,
@@ -240,8 +240,8 @@ impl RunScene {
         Ok(())
     }
 
-    /// How fast a film with so many pictures in a second is, in words; `None` if its pictures are not of instants that
-    /// follow each other.
+    /// How fast a film with `rate` pictures in a second is, in words; `None` if its pictures are not of
+    /// instants that follow each other.
     fn speed(&self, rate: u32) -> Option<String> {
         let (first, last) = (self.entries.first()?.1.time, self.entries.last()?.1.time);
         let between = (last - first) / (self.entries.len() - 1) as f64;

@@ -10,7 +10,7 @@ use super::flow_run::FlowRun;
 use rfm::experiment::Deviation;
 use rfm::sph::Method;
 
-/// Colours of the methods, in the order of their list; a longer list begins anew.
+/// Colours of the methods, in the order of their list; a longer list repeats them.
 const COLOURS: [&str; 6] = ["#2f855a", "#1b6ca8", "#c05621", "#6b46c1", "#b83280", "#4a5568"];
 
 /// Dash patterns for the lines of the first, second and third known quantity.

@@ -57,7 +57,7 @@ impl FlowRun {
         }
         let rounding = self.rounding();
         let order = |coarse: Option<f64>, fine: Option<f64>| {
-            // what is left of errors at the level of rounding says nothing of the method
+            // errors at the level of rounding say nothing about the method
             let (coarse, fine) = (coarse?, fine.filter(|fine| *fine > rounding)?);
             Some((coarse / fine).ln() / halvings).filter(|order| order.is_finite())
         };

@@ -36,8 +36,8 @@ const PARTS: [f64; 3] = [1.0 / 16.0, 1.0 / 4.0, 1.0];
 /// Cells of the obstacles' meshes in a picture, along the longest side of each.
 const CELLS: usize = 64;
 
-/// A run stands still if this number of steps covers less than this part of its time: at that pace a hundred
-/// million steps lie before it.
+/// A run makes no progress if this number of steps covers less than this part of its time: at that pace it
+/// would take a hundred million steps.
 const STANDSTILL: (u64, f64) = (200, 1e-6);
 
 #[derive(Serialize)]

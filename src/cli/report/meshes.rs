@@ -20,8 +20,8 @@ use rfm::solid::Depth;
 /// Resolutions for each method. Each is twice as fine as the one before.
 const RESOLUTIONS: u32 = 4;
 
-/// How many times as long a mesh of twice as many cells may take: it has four times as many triangles, and where contacts
-/// must be searched for, each of them takes longer.
+/// How many times as long a mesh with twice the number of cells may take: it has four times as many
+/// triangles, and where contacts must be searched for, each of them takes longer.
 const FINER: u32 = 8;
 
 /// No mesh is begun that is likely to take longer than this, measured with its error.

@@ -1,7 +1,8 @@
-//! A report as one page for a browser: tables, plots and pictures, the files that it is about, and how to make it again.
+//! A report as one page for a browser: tables, plots and pictures, the files that it is about, and how to
+//! make it again.
 //!
-//! Invariants: the page asks for nothing outside itself, and runs no program. Text of files is escaped, and drawings are
-//! images, in which a browser runs nothing either.
+//! Invariants: the page asks for nothing outside itself, and runs no program. Text of files is escaped, and
+//! drawings are images, in which a browser runs nothing either.
 
 use std::fmt::Write as _;
 use std::time::{SystemTime, UNIX_EPOCH};
@@ -153,7 +154,8 @@ impl Page {
         self.out.into_bytes()
     }
 
-    /// Adds the data that the files read, and returns how many of them the page does not hold: they are too large, or cannot be read.
+    /// Adds the data that the files read, and returns how many of them the page does not hold: they are too
+    /// large, or cannot be read.
     fn data(&mut self, program: &Program, sources: &[&Source]) -> usize {
         let is_source = |name: &String| sources.iter().any(|source| Files::plain(&source.name) == *name);
         let files = program.files();
@@ -281,7 +283,7 @@ fn date(time: SystemTime) -> String {
     format!("{year}-{:02}-{:02} {:02}:{:02} UTC", month + 1, days + 1, minutes / 60, minutes % 60)
 }
 
-/// The name of the processor; `None` where the system does not tell it in a file.
+/// The name of the processor; `None` where the system does not state it in a file.
 fn processor() -> Option<String> {
     let text = std::fs::read_to_string("/proc/cpuinfo").ok()?;
     let line = text.lines().find_map(|line| line.strip_prefix("model name"))?;

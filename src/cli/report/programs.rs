@@ -26,7 +26,7 @@ const REPETITIONS: usize = 25;
 /// After this time a program is not timed again.
 const LONG: Duration = Duration::from_secs(1);
 
-/// The points of the first try, which tells whether a program is slow.
+/// The points of the first try, which shows whether a program is slow.
 const FEW: usize = 16;
 
 /// The speed and the errors of one program, a row of the report.
@@ -121,7 +121,7 @@ pub(super) struct ExactValues {
 }
 
 impl ExactValues {
-    /// `done` is told of every point.
+    /// `done` is called after every point.
     pub fn at(solid: &Solid, points: &SamplePoints, done: &(dyn Fn() + Sync)) -> Self {
         let (graph, outputs) = if solid.moves() {
             // only the formula depends on the time, programs do not
@@ -325,7 +325,7 @@ impl<T: Lane> PointColumns<T> {
         self.first(self.0[0].len())
     }
 
-    /// So many of the points.
+    /// The first `count` points.
     fn first(&self, count: usize) -> [&[T]; 3] {
         self.0.each_ref().map(|c| &c[..count])
     }
@@ -402,8 +402,9 @@ fn sign_mismatches<T: Lane>(found: &[T], truth: &[Option<[Exact; 4]>], at: &[DVe
     (0..found.len()).filter(wrong).count()
 }
 
-/// The median time in nanoseconds per point over many repetitions, after one that does not count. `work` takes the number
-/// of points. A slow program is timed on fewer points and less often, so that no time costs much more than a second.
+/// The median time in nanoseconds per point over many repetitions, after one that does not count. `work`
+/// takes the number of points. A slow program is timed on fewer points and less often, so that no time costs
+/// much more than a second.
 fn median_ns(points: usize, work: &mut dyn FnMut(usize)) -> f64 {
     let started = Instant::now();
     let mut count = FEW.min(points);

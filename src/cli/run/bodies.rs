@@ -27,13 +27,13 @@ impl Bodies {
         Self::of(solids, experiment.domain(), options.mesh_cells)
     }
 
-    /// Solids in a box, to be meshed with so many cells along the longest side of each.
+    /// Solids in a box, to be meshed with the given number of cells along the longest side of each.
     pub fn of(solids: Vec<Solid>, domain: Aabb, cells: usize) -> Self {
         let carried = vec![OnceLock::new(); solids.len()];
         Self { solids, domain, cells, carried }
     }
 
-    /// These bodies with at most so many cells.
+    /// These bodies with at most the given number of cells.
     pub fn coarsened(self, cells: usize) -> Self {
         Self::of(self.solids, self.domain, self.cells.min(cells))
     }

@@ -75,7 +75,7 @@ impl Checkpoints {
 /// The newest sound checkpoint of a run.
 ///
 /// # Errors
-/// There is none, or it is not one of this scene. `read` are the files that the scene's file names.
+/// There is no checkpoint, or it is not one of this scene. `read` are the files that the scene's file names.
 pub(super) fn latest(
     run_folder: &Path,
     fingerprint: &[u8; 32],

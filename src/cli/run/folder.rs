@@ -1,6 +1,7 @@
 //! The folder of a run: who may write into it.
 //!
-//! Invariant: two runs never write into one folder at the same time, and no run is replaced unless that is asked for.
+//! Invariant: two runs never write into one folder at the same time, and no run is replaced unless the user
+//! asks for it.
 
 use std::fs::{File, TryLockError};
 use std::path::{Path, PathBuf};
@@ -45,8 +46,8 @@ pub(super) fn of(options: &Run) -> PathBuf {
     }
 }
 
-/// Refuses a folder that holds a sweep, a run which is neither to be replaced nor to be continued, or files of others that
-/// the run of a scene would replace.
+/// Refuses a folder that holds a sweep, a run which is neither to be replaced nor to be continued, or files
+/// of others that the run of a scene would replace.
 pub(super) fn may_be_written(folder: &Path, options: &Run, scene: &Scene) -> Result<(), Failure> {
     if holds_a_sweep(folder) {
         return Err(Failure::usage(format!(
@@ -159,8 +160,8 @@ impl Hold {
     }
 }
 
-/// Removes files that a killed run was writing, by the beginnings of their names. One that cannot be removed harms
-/// nobody.
+/// Removes files that a killed run was writing, by the beginnings of their names. One that cannot be removed
+/// does no harm.
 fn remove_temporaries(folder: &Path, names: &[&str]) {
     for entry in std::fs::read_dir(folder).into_iter().flatten().flatten() {
         let name = entry.file_name();

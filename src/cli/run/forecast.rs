@@ -23,7 +23,7 @@ use rfm::{Error, Experiment};
 /// Most particles of a simulation that is started to be measured, and least if they have very many neighbours.
 const MEASURED: (f64, f64) = (6000.0, 500.0);
 
-/// So many neighbours of a particle are usual. With more of them fewer particles are measured.
+/// The usual number of neighbours of a particle. With more of them fewer particles are measured.
 const USUAL_NEIGHBOURS: f64 = 500.0;
 
 /// Number of steps before the clock starts: buffers grow in them, and solvers have no answer yet to start from.
@@ -46,11 +46,11 @@ struct Forecast {
     steps: u64,
     passes: Vec<&'static str>,
     bytes: f64,
-    /// Memory that is free now; null where the system does not tell.
+    /// Memory that is free now; null where the system does not provide it.
     bytes_free: Option<f64>,
     frames: u64,
     disk_bytes: f64,
-    /// Room on the disk of the folder; null where the system does not tell.
+    /// Room on the disk of the folder; null where the system does not provide it.
     disk_bytes_free: Option<f64>,
     milliseconds_per_step: f64,
     milliseconds_per_frame: f64,
@@ -59,7 +59,7 @@ struct Forecast {
     seconds: f64,
 }
 
-/// Runs a few steps, and prints what all of them would cost, or those that are left to a run which goes on.
+/// Runs a few steps, and prints what all steps would cost, or the remaining ones of a resumed run.
 pub(super) fn dry_run(
     shared: &Shared,
     options: &Run,
@@ -138,7 +138,7 @@ impl Trial {
         if estimate > 1.5 * most {
             let (coarser, simulation, to_start) = coarser(shared, experiment, most)?;
             let particles = estimate.round() as usize;
-            // a run that goes on places nothing
+            // a resumed run places nothing
             let to_start = if resumed.is_some() { 0.0 } else { to_start };
             return Ok(Self { coarser: Some(coarser), simulation, to_start, particles });
         }
@@ -152,8 +152,8 @@ impl Trial {
     }
 }
 
-/// The scene with few large particles, started, and the seconds that the start took. With particles too large for what the
-/// scene has of gaps nothing may be left, so more of them are tried.
+/// The scene with few large particles, started, and the seconds that the start took. If particles are too
+/// large for the gaps of the scene, nothing may be left, so more particles are tried.
 fn coarser(
     shared: &Shared,
     experiment: &Experiment,
@@ -249,7 +249,7 @@ fn print(forecast: &Forecast) {
     );
 }
 
-/// A short time as a person says it: `0.35 ms`, `31 ms`, `2.4 s`, and longer ones as [`duration`] does.
+/// A short time in a readable form: `0.35 ms`, `31 ms`, `2.4 s`, and longer ones as [`duration`] does.
 fn short(seconds: f64) -> String {
     let digits = |value: f64| if value < 10.0 { format!("{value:.2}") } else { format!("{value:.0}") };
     match seconds {
@@ -269,20 +269,20 @@ fn size(bytes: f64) -> String {
     }
 }
 
-/// Bytes that the process will take: the state and the copy of it that becomes a checkpoint, beside what the program takes
-/// for itself.
+/// Bytes that the process will take: the state and the copy of it that becomes a checkpoint, beside what the
+/// program takes for itself.
 fn memory(simulation: &Simulation, scale: f64) -> f64 {
     let state = simulation.bytes() as f64;
     let own = own_memory().map_or(0.0, |bytes| (bytes - state).max(0.0));
     own + scale * (state + frames::checkpoint_bytes(simulation))
 }
 
-/// Bytes of memory that this process takes now; `None` where the system does not tell.
+/// Bytes of memory that this process takes now; `None` where the system does not provide it.
 fn own_memory() -> Option<f64> {
     kilobytes("/proc/self/status", "VmRSS:")
 }
 
-/// Bytes of memory that programs may still take; `None` where the system does not tell.
+/// Bytes of memory that programs may still take; `None` where the system does not provide it.
 fn free_memory() -> Option<f64> {
     kilobytes("/proc/meminfo", "MemAvailable:")
 }

@@ -175,8 +175,8 @@ impl Frames {
         parts.join(", ")
     }
 
-    /// The speed at the end of the pictures' colours, m/s, if a fluid with this greatest speed has little more than one of
-    /// them.
+    /// The speed at the end of the pictures' colours, m/s, if a fluid with this greatest speed has little
+    /// more than one of them.
     pub fn pale(&self, max_speed: f64) -> Option<f64> {
         self.pictures.as_ref().and_then(|pictures| pictures.pale(max_speed))
     }
@@ -285,7 +285,7 @@ impl FrameCost {
         Ok(Self { seconds, bytes, first, per_particle })
     }
 
-    /// The cost of a frame with so many times as many particles.
+    /// The cost of a frame with the given multiple of particles.
     pub fn scaled(self, scale: f64) -> Self {
         let (seconds, bytes) = self.per_particle;
         Self { seconds: self.seconds + scale * seconds, bytes: self.bytes + scale * bytes, ..self }

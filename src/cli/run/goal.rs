@@ -8,7 +8,7 @@ use crate::cli::output::Shown;
 use rfm::Experiment;
 use rfm::sph::{Simulation, short_time};
 
-/// Where a run begins, or goes on: after so many steps, at a time, s.
+/// Where a run begins, or goes on: after a number of steps, at a time, s.
 #[derive(Clone, Copy, Default)]
 pub(super) struct Begin {
     pub steps: u64,
@@ -42,7 +42,7 @@ impl Goal {
         }
     }
 
-    /// Refuses an end that a flag asks for and that lies behind a run which goes on: it does not go back.
+    /// Refuses an end from a flag that lies before the present time of a resumed run: a run does not go back.
     pub fn lies_ahead(self, options: &Run, folder: &Path, begin: Begin) -> Result<(), Failure> {
         let (time, steps) = (short_time(begin.time), begin.steps);
         let asked = match (options.steps, options.until) {

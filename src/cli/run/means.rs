@@ -1,4 +1,4 @@
-//! Means over the samples of a probe, as the summary tells them.
+//! Means over the samples of a probe, as the summary shows them.
 
 use rfm::experiment::Mean;
 use rfm::lower::AskedMean;
@@ -21,7 +21,7 @@ pub(super) struct Means {
     /// Names of the figures, with their units.
     columns: Vec<String>,
     mean: Vec<Option<f64>>,
-    /// The standard errors; null where there are too few samples to tell.
+    /// The standard errors; null where there are too few samples for them.
     error: Vec<Option<f64>>,
     /// What the scene knows of the first figures; empty if it states nothing.
     known: Vec<f64>,
@@ -43,7 +43,8 @@ fn is_zero(count: &usize) -> bool {
 const WITHOUT_TORQUE: usize = 3;
 
 impl Means {
-    /// The means of a table's rows, each of which begins with its time. A row stands for the time since the one before it.
+    /// The means of a table's rows, each of which begins with its time. A row stands for the time since the
+    /// one before it.
     pub fn of(name: &str, probe: &Probe, asked: &AskedMean, rows: &[Vec<f64>]) -> Self {
         let time = |row: &[f64]| row.first().copied().unwrap_or(f64::NAN);
         let mean_of = |column: usize| {
@@ -79,7 +80,7 @@ impl Means {
         Some((self.from, mean, self.error.get(column).copied().flatten()))
     }
 
-    /// These means, taken from a table that lacks so many samples.
+    /// These means, taken from a table that lacks the given number of samples.
     pub fn lacking(self, lost: usize) -> Self {
         Self { lost, ..self }
     }
@@ -133,7 +134,7 @@ fn alone(value: f64) -> String {
     }
 }
 
-/// A value with as many digits as its error leaves it, and the error with two, in one notation.
+/// A value with the digits that its error leaves it, and the error with two, in one notation.
 fn rounded(value: f64, error: f64) -> (String, String) {
     let last = if error > 0.0 { error.log10().floor() - 1.0 } else { -6.0 };
     let size = value.abs().max(error);

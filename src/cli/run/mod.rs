@@ -184,7 +184,7 @@ fn refused(error: Error) -> Failure {
     }
 }
 
-/// All that a run writes while it goes on.
+/// Everything that a run writes while it is running.
 struct Recording<'a> {
     experiment: &'a Experiment,
     frames: Frames,

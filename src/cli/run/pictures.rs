@@ -38,7 +38,7 @@ const FASTEST: f64 = 0.6;
 /// The part of the colours that a fluid should use: they are chosen before anything is known of its motion.
 const PALE: f64 = 0.25;
 
-/// What is asked of pictures, besides what the scene states.
+/// Options of pictures, besides what the scene states.
 #[derive(Debug, Clone, Copy)]
 pub(in crate::cli) struct Look<'a> {
     /// The file of the scene, for the title.
@@ -70,7 +70,7 @@ pub(in crate::cli) struct Pictures {
     bodies: Vec<Body>,
     /// How the surface of the fluid is drawn in place of the particles, and the plane that cuts it open.
     surface: Option<(Surface, Option<Cut>)>,
-    /// The speed at the end of the colours, m/s; `None` where they do not tell speeds.
+    /// The speed at the end of the colours, m/s; `None` where they do not show speeds.
     colours_end: Option<f64>,
     pub(in crate::cli) count: usize,
 }
@@ -79,7 +79,7 @@ pub(in crate::cli) struct Pictures {
 struct Body {
     solid: Solid,
     drawn: Drawn,
-    /// Its surface where it stands still and has so many faces that it pays to ask first whether one is near.
+    /// Its surface, if it stands still and has so many faces that it pays to ask first whether one is near.
     near: Option<Box<dyn Walls>>,
 }
 

@@ -1,5 +1,5 @@
-//! The samples of probes, as CSV that grows by one line at a time, and as a plot at the end. Every run also has tables of
-//! its energy and its audit.
+//! The samples of probes, as CSV that grows by one line at a time, and as a plot at the end. Every run also
+//! has tables of its energy and its audit.
 //!
 //! Invariant: however a run ends, a file holds its header and the lines of all samples before that. At most
 //! one line is cut off, which `--resume` removes.
@@ -190,7 +190,8 @@ struct Past {
 }
 
 impl Past {
-    /// Reads a table as far as a checkpoint. Says what it lacks, and where a table begins that is not as old as the run.
+    /// Reads a table as far as a checkpoint. Says what it lacks, and where a table begins that is not as old
+    /// as the run.
     fn of(path: &Path, header: &str, checkpoint: &Checkpoint) -> Self {
         let kept = lines_until(path, header, checkpoint.time * (1.0 + ROUNDING));
         let taken = checkpoint.get(&samples_column(path)).ok().and_then(|numbers| numbers.first().copied());

@@ -21,13 +21,13 @@ pub(super) struct NoRoom {
 /// The part of a fluid's volume that must be free for a run to mean anything.
 const LEAST_ROOM: f64 = 0.8;
 
-/// The part of its volume that a fluid must have free if its numbers became useless for another reason. Volumes are found
-/// by samples, to a few hundredths.
+/// The part of its volume that a fluid must have free if its numbers became useless for another reason.
+/// Volumes are found by samples, to a few hundredths.
 const ENOUGH_ROOM: f64 = 1.05;
 
 impl NoRoom {
-    /// Whether moving obstacles leave a fluid too little room at the present time. If its numbers are useless, `failed`,
-    /// already a lack of room for its expansion is the reason.
+    /// Whether moving obstacles leave a fluid too little room at the present time. If its numbers are
+    /// useless, `failed`, already a lack of room for its expansion is the reason.
     pub fn of(experiment: &Experiment, simulation: &Simulation, failed: bool) -> Option<Self> {
         if !experiment.bodies().iter().any(|body| body.solid.moves()) {
             return None;

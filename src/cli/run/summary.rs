@@ -39,8 +39,9 @@ pub(super) struct Summary {
     kinetic_energy: f64,
     potential_energy: f64,
     energy_at_start: f64,
-    /// The greatest excess of the energy over that at the start and the work of gravity and walls, as a part of the greatest
-    /// energy so far; where walls move, over the least that was left of it. Null if it cannot be judged.
+    /// The greatest excess of the energy over that at the start and the work of gravity and walls, as a part
+    /// of the greatest energy so far; where walls move, over the least that was left of it. Null if it cannot
+    /// be judged.
     energy_excess: Option<f64>,
     /// Why it cannot be judged.
     #[serde(skip_serializing_if = "Option::is_none")]

@@ -1,4 +1,4 @@
-//! The figures of a run while it goes on: those of the last saved instant, and the worst of all saved
+//! The figures of a run while it is running: those of the last saved instant, and the worst of all saved
 //! instants.
 
 use std::time::Duration;
@@ -10,7 +10,7 @@ use rfm::sph::{Checkpoint, Simulation, Stats};
 /// Name of the memory of [`Watch`] in a checkpoint.
 pub(super) const WATCH: &str = "watch";
 
-/// The figures of a run while it goes on.
+/// The figures of a run while it is running.
 pub(super) struct Watch {
     /// Time that the steps have taken.
     pub spent: Duration,

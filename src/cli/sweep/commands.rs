@@ -9,8 +9,8 @@ use super::figures::Command;
 use super::options::SweepOptions;
 use super::task::Task;
 
-/// What a command shall do again and again, in the folder that is asked for or one beside the file: whether it resumes and
-/// replaces, and all its other options as a text.
+/// A command to repeat, and the folder for its results: the stated one, or one beside the file. It holds
+/// whether the command resumes and replaces, and all its other options as a text.
 fn task<'a>(
     shared: &'a Shared,
     command: Command,
@@ -91,7 +91,7 @@ pub(in crate::cli) fn run(shared: &Shared, options: &Run) -> Result<(), Failure>
     };
     let again = [options.resume, options.force];
     task(shared, Command::Run, &options.file, &sweep, again, format!("{single:?}")).go(|shared, folder| {
-        // a run of the sweep that was interrupted goes on; what else is in its folder belongs to the sweep
+        // an interrupted run of the sweep is continued; everything else in its folder belongs to the sweep
         let resume = options.resume && runs::has_checkpoint(folder);
         let force = !resume && (options.resume || options.force);
         runs::run(shared, &Run { output: Some(folder.to_path_buf()), resume, force, ..single.clone() })

@@ -17,7 +17,7 @@ pub(super) struct Figure {
     /// Empty for a plain number.
     #[serde(default, skip_serializing_if = "String::is_empty")]
     pub unit: String,
-    /// Whether it is that of what the cells show, which is not all of the solid.
+    /// Whether it belongs to what the cells show, which is not all of the solid.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub unresolved: bool,
 }
@@ -87,7 +87,7 @@ const RUN: [&str; 8] = [
 /// The figure that says whether a solid is resolved.
 const RESOLVED: &str = "resolved";
 
-/// Whether a figure's name is that of what is said beside volumes and areas already, for people.
+/// Whether a figure's name is that of one that volumes and areas already show, for people.
 pub(super) fn is_said_elsewhere(name: &str) -> bool {
     name.rsplit('.').next() == Some(RESOLVED)
 }
@@ -135,8 +135,8 @@ fn of_solids(document: &Value) -> Vec<Figure> {
     solids.iter().flat_map(figures).collect()
 }
 
-/// The figures of a report: for a solid the fastest program of ω over many points in f64, and the finest mesh; for a flow
-/// the errors and the time of each run.
+/// The figures of a report: for a solid the fastest program of ω over many points in f64, and the finest
+/// mesh; for a flow the errors and the time of each run.
 fn of_report(document: &Value) -> Vec<Figure> {
     let rows = document["rows"].as_array().map_or(&[][..], |list| list);
     if document["scene"].is_string() {

@@ -44,7 +44,7 @@ pub(super) struct Row {
     pub failure: Option<String>,
 }
 
-/// Who reads a table.
+/// The reader for whom a table is written.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Reader {
     /// Five digits, and errors behind them.

@@ -1,5 +1,5 @@
-//! `--sweep`: a command for each combination of values of some params, each in a folder of its own, with an index, a table
-//! and a plot of the main figures.
+//! `--sweep`: a command for each combination of values of some params, each in a folder of its own, with an
+//! index, a table and a plot of the main figures.
 //!
 //! | file | what it holds |
 //! |---|---|
@@ -11,7 +11,8 @@
 //! | `index` | `index.json` and the table |
 //! | `plot` | the plot |
 //!
-//! Invariant: a combination that fails is told in the index, and the others go on. The index is written after each.
+//! Invariant: a combination that fails is noted in the index, and the others go on. The index is written
+//! after each.
 
 pub(in crate::cli) mod commands;
 mod figures;

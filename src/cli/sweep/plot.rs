@@ -1,5 +1,5 @@
-//! The plot of a sweep: one panel for each figure that changes, over the first param, with a line for each combination of
-//! the others.
+//! The plot of a sweep: one panel for each figure that changes, over the first param, with a line for each
+//! combination of the others.
 
 use std::fmt::Write;
 
@@ -8,7 +8,7 @@ use super::figures::is_said_elsewhere;
 use super::index::{Index, Row};
 use rfm::slice;
 
-/// Panels at most: the first figures are the main ones.
+/// Maximum number of panels: the first figures are the main ones.
 const MOST_PANELS: usize = 12;
 
 /// More panels than this stand in two columns.

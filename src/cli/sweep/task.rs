@@ -17,10 +17,11 @@ use rfm::Program;
 use rfm::diagnostic::nearest;
 use rfm::slice;
 
-/// Combinations of a sweep at most. A larger number is a typing error.
+/// Maximum number of combinations of a sweep. A larger number is a typing error.
 const MOST_COMBINATIONS: usize = 10_000;
 
-/// Time between two writes of the index: what a process that is killed in between has done is done again.
+/// Time between two writes of the index. If the process is killed in between, the work since the last write
+/// is done again.
 const BETWEEN_WRITES: Duration = Duration::from_secs(1);
 
 /// Files that a sweep writes beside its index.
@@ -167,7 +168,8 @@ impl Task<'_> {
         Ok((row, exit == 130))
     }
 
-    /// Whether the file has the params, within whose ranges all values lie. Returns a hash of what the results depend on.
+    /// Whether the file has the params, within whose ranges all values lie. Returns a hash of what the
+    /// results depend on.
     fn check(&self) -> Result<String, Failure> {
         for (i, sweep) in self.sweeps.iter().enumerate() {
             if self.sweeps[..i].iter().any(|other| other.name == sweep.name) {

@@ -101,7 +101,7 @@ impl Sweep {
     }
 }
 
-/// All combinations of the values of several sweeps: the last one goes through its values first.
+/// All combinations of the values of several sweeps: the last one changes fastest.
 pub(super) fn grid(sweeps: &[Sweep]) -> Vec<Vec<f64>> {
     sweeps.iter().fold(vec![Vec::new()], |points, sweep| {
         let extended = |point: &Vec<f64>| -> Vec<Vec<f64>> {

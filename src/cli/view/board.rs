@@ -1,4 +1,4 @@
-//! The newest of everything that pages are told. Whoever is slow misses what came between.
+//! The latest message of each topic for pages. A slow page skips those in between.
 
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
@@ -13,12 +13,13 @@ use rfm::view::{Plot, Setting};
 /// The longest time after which a page that waits looks whether it is still wanted.
 const LOOK: Duration = Duration::from_millis(500);
 
-/// What a page is told, in the order in which it is sent.
+/// What is sent to a page, in the order in which it is sent.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Topic {
     Setting,
     Mesh,
-    /// The mesh of what is only moved. It is sent after that of one instant: a page that gets that one forgets this.
+    /// The mesh of bodies that are only moved. It is sent after the mesh of one instant, because a page that
+    /// receives the latter forgets the former.
     Carried,
     Field,
     Slice,
@@ -68,7 +69,7 @@ struct News {
     newest: [(u64, Option<Message>); TOPICS],
 }
 
-/// The newest of everything that pages are told.
+/// The latest of everything that is sent to pages.
 #[derive(Default)]
 pub(super) struct Board {
     news: Mutex<News>,

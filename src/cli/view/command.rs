@@ -27,7 +27,7 @@ pub(super) enum Command {
     Gravity { vector: [f64; 3] },
     /// Show ω in the plane across an axis at a coordinate, m; in none without an axis.
     Slice { axis: Option<SliceAxis>, at: f64 },
-    /// Show so many simulated seconds in a second, if the machine is fast enough.
+    /// Show the given number of simulated seconds in a second, if the machine is fast enough.
     Speed { value: f64 },
     /// The page has taken a message and is ready for another one.
     Seen,

@@ -1,4 +1,4 @@
-//! What goes on in time: a fluid among its obstacles, or a solid that moves by itself.
+//! The thing that changes in time: a fluid among its obstacles, or a solid that moves by itself.
 
 use std::sync::Arc;
 
@@ -86,7 +86,7 @@ impl Course {
         }
     }
 
-    /// Goes on: a fluid by a step of its own, a solid by so much time, s.
+    /// Advances: a fluid by a step of its own, a solid by the time `by`, s.
     ///
     /// # Errors
     /// Why the run has ended.
@@ -142,7 +142,8 @@ impl Course {
         }
     }
 
-    /// What is to be said of it besides the time. `spent` is the time of the clock that a step takes, s.
+    /// The rest of the progress message, after the time. `spent` is the time of the clock that a step takes,
+    /// s.
     pub fn details(&self, spent: f64) -> String {
         match self {
             Self::Fluid(flow) => flow.details(spent),
@@ -177,7 +178,8 @@ impl Course {
 }
 
 impl Flow {
-    /// A simulation at its start, with obstacles of so many mesh cells along the longest side of each.
+    /// A simulation at its start, with obstacles meshed with the given number of cells along the longest side
+    /// of each.
     ///
     /// # Errors
     /// The messages, as the command line shows them.

@@ -10,7 +10,7 @@ use rfm::{Engine, Program, Solid};
 /// The most operations of formulas that pages march rays through: drivers take seconds for longer ones.
 const MOST_OPERATIONS: usize = 600;
 
-/// What a page is told of the obstacles' formula.
+/// What is sent to a page about the obstacles' formula.
 #[derive(Debug, Clone, PartialEq, Eq, Default, Serialize)]
 pub(super) struct Field {
     /// The text of [`source::marched`]; `None` if only meshes can be shown.
@@ -25,7 +25,8 @@ pub(super) struct Field {
 }
 
 impl Field {
-    /// The formula of what stands in a scene, or of a solid. `standing` are these solids with their params as constants.
+    /// The formula of what stands in a scene, or of a solid. `standing` are these solids with their params as
+    /// constants.
     pub fn of(checked: &Checked, standing: &[Solid]) -> Self {
         let found = if standing.is_empty() { Ok(Self::default()) } else { Self::open(checked, standing) };
         found.unwrap_or_else(|reason| Self { reason, ..Self::default() })

@@ -147,7 +147,7 @@ impl SavedRun {
     }
 }
 
-/// The meshes of the obstacles as they are written: one that is that of before, only elsewhere, is not written again.
+/// The meshes of the obstacles as they are written: a mesh that has only moved is not written again.
 #[derive(Default)]
 struct Meshes {
     /// How many are written.
@@ -160,7 +160,7 @@ struct Meshes {
     poses: Vec<[f64; 12]>,
 }
 
-/// A page draws each part of a mesh for itself: of more parts it is given one mesh for each frame.
+/// A page draws each part of a mesh by itself. For more parts than this it receives one mesh for each frame.
 const MOST_PARTS: f64 = 1000.0;
 
 /// How far a part may lie from its mesh, as a part of the longest side of all: half a step of the 16 bits of
@@ -201,7 +201,7 @@ impl Meshes {
     }
 }
 
-/// The bodies of the mesh of a file, told apart by its array `body` if it has one.
+/// The bodies of the mesh of a file, distinguished by its array `body` if it has one.
 fn parts_of(file: &[u8]) -> io::Result<Vec<Mesh>> {
     let whole = read_mesh(file).map_err(io::Error::other)?;
     let (_, arrays) = read_arrays(file).map_err(io::Error::other)?;

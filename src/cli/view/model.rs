@@ -67,7 +67,7 @@ pub(super) enum Detail {
 /// Most cells along the longest side of a mesh that is shown while a slider moves.
 const PASSING_CELLS: usize = 40;
 
-/// What tells one state of a file from another one.
+/// What distinguishes one state of a file from another.
 pub(super) type Stamp = Option<Vec<Option<(SystemTime, u64)>>>;
 
 impl Subject {
@@ -101,7 +101,7 @@ impl Subject {
         Some(std::iter::once(Some(own)).chain(named.iter().map(|name| of(Path::new(name)))).collect())
     }
 
-    /// Reads the files that the file names anew when it is next checked.
+    /// Makes sure that the files which the file names are read again when it is next checked.
     pub fn forget(&self) {
         self.files.forget();
     }
@@ -142,8 +142,8 @@ impl Subject {
         Ok(Checked { program, scene, solid: self.solid.clone() })
     }
 
-    /// All that stands in the fluid's way at the start, or the solid at a time, s, with the block of its mesh. A solid whose way
-    /// ends before that time is shown at its end.
+    /// All that stands in the fluid's way at the start, or the solid at a time, s, with the block of its
+    /// mesh. A solid whose way ends before that time is shown at its end.
     ///
     /// # Errors
     /// Why there is no mesh.

@@ -1,4 +1,4 @@
-//! Quantities over time for a page: those that a run has written as tables, and those of one that goes on.
+//! Quantities over time for a page: those that a run has written as tables, and those of a live run.
 //!
 //! A table becomes a plot for each unit, so that each plot has one axis. Parts of one are shown in per cent.
 
@@ -13,7 +13,7 @@ use rfm::view::{Column, Plot};
 /// Most points of a plot.
 const MOST_POINTS: usize = 1000;
 
-/// Most samples of a run that goes on; beyond them every other one is left out.
+/// Maximum number of samples of a live run; beyond it every other one is left out.
 const MOST_SAMPLES: usize = 600;
 
 /// Times with columns of values.
@@ -102,8 +102,8 @@ impl Table {
     }
 }
 
-/// The plots of a run's folder: its energy and its audit, then its probes. A table that cannot be read is left out: it may
-/// be a file of the user's.
+/// The plots of a run's folder: its energy and its audit, then its probes. A table that cannot be read is
+/// left out: it may be a file of the user's.
 pub(super) fn saved(folder: &Path) -> Vec<Plot> {
     let files = std::fs::read_dir(folder.join("probes")).into_iter().flatten().flatten();
     let mut paths: Vec<PathBuf> = files.map(|entry| entry.path()).collect();
@@ -118,10 +118,10 @@ pub(super) fn saved(folder: &Path) -> Vec<Plot> {
     own.chain(probes.iter().cloned()).flat_map(|table| table.plots()).collect()
 }
 
-/// The quantities of a run that goes on.
+/// The quantities of a live run.
 pub(super) struct History {
     probes: Vec<(Gauge, Table)>,
-    /// One sample of so many is kept.
+    /// One sample in this number is kept.
     every: usize,
     /// The samples so far, kept or not.
     passed: usize,

@@ -1,4 +1,4 @@
-//! Requests of browsers: as much of HTTP as the viewer needs, and who may ask.
+//! Requests of browsers: the part of HTTP that the viewer needs, and the check of who may ask.
 //!
 //! Invariant: what is read is limited in length and time, and nothing in it is trusted.
 

@@ -85,7 +85,7 @@ impl Server {
             let (server, content) = (Arc::clone(&server), Arc::clone(&content));
             let spawned = thread::Builder::new().name("rfm-page".into()).spawn(move || {
                 if place.is_beyond_the_last() {
-                    // who is refused may have gone already
+                    // a refused client may be gone already
                     let _ = request::refuse(&mut stream, Refusal::CROWDED);
                     return;
                 }
@@ -97,7 +97,7 @@ impl Server {
         }
     }
 
-    /// Answers one connection. Errors of a browser that goes away are its own affair.
+    /// Answers one connection. Errors of a browser that leaves are ignored.
     fn attend(&self, mut stream: TcpStream, content: &Content) {
         let _ = stream.set_nodelay(true);
         let _ = stream.set_write_timeout(Some(SEND_PATIENCE));
@@ -136,7 +136,7 @@ impl Server {
     fn part<'a>(&self, path: &'a str) -> Result<&'a str, Refusal> {
         let (token, part) =
             path.strip_prefix('/').and_then(|path| path.split_once('/')).ok_or(Refusal::TOKEN)?;
-        // the time of the comparison does not tell how many characters were right
+        // the time of the comparison does not reveal how many characters were right
         let differences = token.bytes().zip(self.token.bytes()).filter(|(a, b)| a != b).count();
         if token.len() == self.token.len() && differences == 0 { Ok(part) } else { Err(Refusal::TOKEN) }
     }

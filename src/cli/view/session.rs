@@ -1,6 +1,7 @@
-//! The simulation on its own thread: it takes commands, goes on, and puts what is new on the board.
+//! The simulation on its own thread: it takes commands, advances, and puts what is new on the board.
 //!
-//! Invariant: an error of the file leaves the last good run as it is; it is told beside it until the file is mended.
+//! Invariant: an error of the file leaves the last good run as it is; it is shown beside it until the file is
+//! mended.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -32,7 +33,7 @@ const FRAME: Duration = Duration::from_millis(33);
 /// Time of the clock between plots.
 const PLOTS: Duration = Duration::from_millis(250);
 
-/// A file that is not there so many times in a row, every [`LOOK`], is gone.
+/// A file that is missing this many times in a row, every [`LOOK`], is gone.
 const MISSED: u32 = 4;
 
 /// Pause of a simulation that is ahead of the clock.
@@ -48,7 +49,7 @@ pub(super) struct Session {
     /// How often the file was not there when it was looked for.
     missed: u32,
     checked: Option<Checked>,
-    /// What goes on in time; `None` if the file has nothing that does.
+    /// The fluid or solid that changes in time; `None` if the file has none.
     course: Option<Course>,
     status: Status,
     /// What stands in the scene as it is shown, and the box around it.
@@ -70,7 +71,7 @@ struct Pace {
     mesh: MeshShown,
     /// The run whose mesh is carried along and has been shown.
     carried: Option<u64>,
-    /// When the plots were told.
+    /// When the plots were last sent.
     plots: Instant,
 }
 
@@ -121,7 +122,7 @@ impl Session {
         Ok(send)
     }
 
-    /// Runs until nobody can send commands any more.
+    /// Runs until no more commands can arrive.
     fn go(mut self, commands: &Receiver<Command>) {
         self.stamp = self.subject.stamp();
         self.load();
@@ -130,7 +131,7 @@ impl Session {
         let mut looked = Instant::now();
         let mut waited = false;
         loop {
-            // a simulation that nobody looks at waits, and does not make up for that later
+            // a simulation without viewers waits, and does not make up for that later
             let is_watched = self.board.is_watched();
             if is_watched && waited {
                 self.follow_clock();
@@ -263,11 +264,11 @@ impl Session {
         self.tell();
     }
 
-    /// Checks the file with values for params and shows its obstacles. `None` if that is not possible; the reason is
-    /// told then.
+    /// Checks the file with values for params and shows its obstacles. `None` if that is not possible; the
+    /// reason is then reported.
     fn show_mesh(&mut self, values: &BTreeMap<String, f64>, detail: Detail) -> Option<Checked> {
         let began = Instant::now();
-        // a solid that moves goes on from where it is
+        // a moving solid continues from where it is
         let time = match &self.course {
             Some(course @ Course::Solid(_)) => course.time(),
             Some(Course::Fluid(_)) | None => 0.0,
@@ -402,7 +403,7 @@ impl Session {
     fn is_ahead(&self) -> bool {
         self.course.as_ref().is_none_or(|course| match course {
             Course::Fluid(_) => course.time() >= self.due(),
-            // it takes no time to go on, so it does for each picture
+            // a step takes no time, so there is one for each picture
             Course::Solid(_) => course.time() + self.frame_time() > self.due(),
         })
     }
@@ -424,8 +425,8 @@ impl Session {
         self.tell();
     }
 
-    /// Takes steps, at least one, until `is_enough` of the simulated time, and shows the instant. `by` is the time, s,
-    /// by which something goes on that has no steps of its own.
+    /// Takes steps, at least one, until `is_enough` of the simulated time, and shows the instant. `by` is the
+    /// time, s, by which something without steps of its own advances.
     fn steps(&mut self, by: f64, is_enough: impl Fn(f64) -> bool) {
         let Some(course) = self.course.as_mut().filter(|course| !course.has_ended()) else { return };
         loop {
@@ -496,7 +497,7 @@ impl Session {
         self.board.set_block(Topic::Frame, course.frame(self.run));
     }
 
-    /// Tells what takes a while from now on.
+    /// Reports that something takes a while from now on.
     fn announce(&mut self, doing: &str) {
         self.status.text = doing.into();
         self.board.set_status(&self.status);

@@ -10,7 +10,8 @@ const INSTANTS: u32 = 32;
 /// The longest side of that room, in longest sides of the solid at the start.
 const MOST_ROOM: f64 = 12.0;
 
-/// The longest time for which a solid is watched, s. If its way takes up too much room, half of that is tried, and so on.
+/// The longest time for which a solid is watched, s. If its way takes up too much room, half of that is
+/// tried, and so on.
 const LONGEST: f64 = 1024.0;
 
 /// How often the time is halved.
@@ -23,7 +24,8 @@ pub(super) struct Way {
     pub room: Aabb,
     /// When it begins, s: 0 unless the solid is empty then.
     pub start: f64,
-    /// When it ends, s: at its beginning if the solid stands still, and before one that goes away is out of sight.
+    /// When it ends, s: at its beginning if the solid stands still, and before the solid is out of sight if
+    /// it goes away.
     pub end: f64,
 }
 
@@ -45,12 +47,12 @@ impl Way {
         let way =
             if solid.moves() { ends.find_map(|end| Self::until(solid, room, start, end)) } else { None };
         let Self { room, start, end } = way.unwrap_or(Self { room, start, end: start });
-        // what lies between the instants, and the plane of a face in the border of the box
+        // room for the instants in between, and for a face in the border of the box
         let slack = if end > start { 0.02 } else { 1e-3 };
         Ok(Self { room: room.grown(slack * side(&room)), start, end })
     }
 
-    /// The way between two times from a first place on; `None` if it takes up too much room.
+    /// The way between two times, beginning at a first place; `None` if it takes up too much room.
     fn until(solid: &Solid, first: Aabb, start: f64, end: f64) -> Option<Self> {
         let mut room = first;
         for time in instants(end - start).map(|time| start + time).chain([end]) {
