@@ -339,7 +339,7 @@ pub unsafe extern "C" fn rfm_collide(
         let rebound = Rebound::new(restitution, friction, reach).map_err(RfmError::bad)?;
         let [positions, velocities] = [positions, velocities]
             .map(|vectors| [vectors.x, vectors.y, vectors.z].map(|start| Column::new(start, vectors.stride)));
-        // SAFETY: the caller promises so many particles
+        // SAFETY: the caller promises `count` particles
         let mut particles = Particles::new(unsafe { Vectors::new(count, [positions, velocities]) });
         let mut counts = Collisions::default();
         // a part at a time, so that little is remembered

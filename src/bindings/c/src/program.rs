@@ -38,7 +38,7 @@ unsafe fn options(params: *const RfmParam, count: usize) -> Result<Options, RfmE
         return Err(RfmError::bad("params is null"));
     }
     for i in 0..count {
-        // SAFETY: the caller promises so many params
+        // SAFETY: the caller promises that number of params
         let param = unsafe { *params.add(i) };
         // SAFETY: and that their names end with zero bytes
         let name = unsafe { read_text(param.name, "the name of a param") }?;
@@ -65,7 +65,7 @@ unsafe fn checked_text(
 ) -> Result<RfmProgram, RfmError> {
     // SAFETY: the caller promises texts
     let (text, name) = unsafe { (read_text(text, "text")?, read_text(name, called)?) };
-    // SAFETY: the caller promises so many params
+    // SAFETY: the caller promises that number of params
     let mut options = unsafe { options(params, count) }?;
     options.files = files(name);
     checked(Source::file(name, text), options)
@@ -84,7 +84,7 @@ pub unsafe extern "C" fn rfm_load_file(
     let load = || {
         // SAFETY: the caller promises a text
         let path = unsafe { read_text(path, "path") }?;
-        // SAFETY: the caller promises so many params
+        // SAFETY: the caller promises that number of params
         let mut options = unsafe { options(params, count) }?;
         options.files = files_beside(path, false);
         let read = std::fs::read(path).and_then(library::compile::text_of);

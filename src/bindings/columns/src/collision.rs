@@ -49,8 +49,8 @@ impl Obstacle {
     fn known(&self) -> &Known {
         self.known.get_or_init(|| {
             if self.solid.moves() && !self.solid.has_many_leaves() {
-                // its bounds would be searched anew for every step: 5 ms for a box that turns, against 0.1 ms for ω of three
-                // thousand particles
+                // its bounds would be searched again for every step: 5 ms for a box that turns, against 0.1
+                // ms for ω of three thousand particles
                 return Known { bounds: None, walls: Box::new(self.solid.twin()) };
             }
             let bounds = match *self.solid.bounds() {
@@ -124,7 +124,7 @@ impl Particles {
     }
 
     /// The number of particles.
-    #[allow(clippy::len_without_is_empty)] // nobody asks
+    #[allow(clippy::len_without_is_empty)] // not needed
     pub fn len(&self) -> usize {
         self.0.len()
     }

@@ -10,8 +10,9 @@ use crate::number::Number;
 /// Numbers that a column of copied points has room for.
 pub const BLOCK: usize = 256;
 
-/// Bytes of a column that are copied at a time. Rows are read while nothing is computed, so that the processor waits for
-/// those that it has not fetched on its own; with more bytes it waits, with fewer the calls cost more.
+/// Bytes of a column that are copied at a time. Rows are read while nothing is computed, so that the
+/// processor waits for those that it has not fetched on its own; with more bytes it waits, with fewer the
+/// calls cost more.
 const BYTES_AT_A_TIME: usize = 1024;
 
 /// Numbers at equal distances in memory.
@@ -101,7 +102,7 @@ impl<const N: usize> Vectors<N> {
     }
 
     /// The number of indices.
-    #[allow(clippy::len_without_is_empty)] // nobody asks
+    #[allow(clippy::len_without_is_empty)] // not needed
     pub fn len(&self) -> usize {
         self.count
     }
@@ -175,7 +176,7 @@ impl<T: Number, const N: usize> Job<T, N> {
     }
 
     /// The number of points.
-    #[allow(clippy::len_without_is_empty)] // nobody asks
+    #[allow(clippy::len_without_is_empty)] // not needed
     pub fn len(&self) -> usize {
         self.count
     }

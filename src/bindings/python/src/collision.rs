@@ -38,7 +38,7 @@ pub fn collide<'py>(
     }
     // SAFETY: the arguments keep their arrays, and callers promise not to use them meanwhile
     let mut particles = Particles::new(unsafe { Vectors::new(x.count, [x.columns, v.columns]) });
-    // with Python's lock, so that nobody forks a process in which this would never end
+    // with Python's lock, so that no other thread forks a process in which this would never end
     obstacle.prepare();
     let found = look(py, &particles, obstacle, rebound, threads)?;
     let mut counts = Collisions::default();

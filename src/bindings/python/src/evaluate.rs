@@ -10,7 +10,7 @@ use crate::points::Points;
 use crate::pool::{CHUNK, Threads, in_ranges};
 use crate::results::Target;
 
-/// From so many points on, several threads are used if the caller states no number.
+/// From this number of points on, several threads are used unless the caller states a number.
 pub const WORTH_THREADS: usize = 4 * CHUNK;
 
 /// Calls `evaluate` for all points.

@@ -15,7 +15,7 @@ use rfm::glam::DVec3;
 use crate::points::numpy;
 use crate::pool::{Threads, in_ranges};
 
-/// From so many paths on, several threads are used if the caller states no number.
+/// From this number of paths on, several threads are used unless the caller states a number.
 const WORTH_THREADS: usize = 1024;
 
 /// The first entries of many paths as the class `Entry`.

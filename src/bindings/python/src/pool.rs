@@ -1,7 +1,7 @@
 //! Threads: pools that are made when they are first needed.
 //!
-//! A process that was forked has none of the threads of its parent, and whoever waits for them waits for ever.
-//! So nothing here uses the global pool of rayon, and a child that inherits pools works on one thread of its
+//! A process that was forked has none of the threads of its parent, and waiting for them never ends. So
+//! nothing here uses the global pool of rayon, and a child that inherits pools works on one thread of its
 //! own.
 
 use std::collections::BTreeMap;
@@ -109,7 +109,7 @@ pub fn run<R: Send>(py: Python<'_>, threads: Threads, work: impl FnOnce() -> R +
 pub struct Watch(Arc<AtomicBool>);
 
 impl rfm::mesh::Watch for Watch {
-    /// Nobody waits for the result of what Ctrl-C has ended.
+    /// The result of what Ctrl-C has ended is not needed.
     fn is_over(&self) -> bool {
         self.0.load(Ordering::Relaxed)
     }
@@ -133,7 +133,7 @@ pub fn run_watched<R: Send + 'static>(
     let wait = || result.lock().unwrap_or_else(PoisonError::into_inner).recv_timeout(LOOK);
     let watched = watch.clone();
     pool.spawn(move || {
-        // an error of the send means that nobody waits
+        // an error of the send means that the receiver is gone
         let _ = done.send(catch_unwind(AssertUnwindSafe(|| work(&watched))));
     });
     loop {
@@ -201,7 +201,7 @@ pub fn in_ranges<R: Send>(
             spent = begun.elapsed();
         });
         begin = range.end;
-        // long enough to cost nothing, short enough for the one who waits
+        // long enough to cost nothing, short enough for the waiting thread
         size = match spent {
             spent if spent < LOOK / 16 => size.saturating_mul(8),
             spent if spent < LOOK / 2 => size.saturating_mul(2),
