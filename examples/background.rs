@@ -11,7 +11,7 @@ use std::thread;
 
 use rfm::{Engine, Experiment, Program};
 
-/// What the thread tells of an instant.
+/// What the thread sends about an instant.
 struct Report {
     time: f64,
     steps: u64,
@@ -35,7 +35,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
             let height = z.iter().sum::<f64>() / z.len() as f64;
             let report = Report { time: simulation.time(), steps: simulation.steps(), height };
             if send.send(report).is_err() {
-                break; // nobody listens any more
+                break; // the receiver is gone
             }
         }
         Ok::<u64, String>(simulation.steps())

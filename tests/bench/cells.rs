@@ -89,7 +89,7 @@ fn union(balls: usize) -> Solid {
     program.and_then(|program| program.solid("s")).unwrap_or_else(|e| panic!("{e}"))
 }
 
-/// Nanoseconds per point. The pass is told where a portion begins and how long it is.
+/// Nanoseconds per point. The pass receives the beginning and the length of a portion.
 fn best(points: usize, portion: usize, rounds: usize, pass: &mut dyn FnMut(usize, usize)) -> f64 {
     let mut best = vec![f64::INFINITY; points.div_ceil(portion)];
     for _ in 0..=rounds {

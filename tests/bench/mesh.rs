@@ -3,10 +3,10 @@
 //! and `-- --large` 2048 cells too. It asserts nothing about time.
 //!
 //! Pawn and bishop stand in the box [0, 3]³, as in the paper; the balls are 500 at random places. The fastest
-//! of several runs counts, and runs on one thread and on all take turns. Where the system tells (Linux), the
-//! processor time of one thread stands beside it, which other programs hardly disturb. What a solid prepares
-//! once (machine code, cell map) is timed separately. The exponent is that of the least-squares line through
-//! log time on one thread against log cells.
+//! of several runs counts, and runs on one thread and on all take turns. Where the system provides it
+//! (Linux), the processor time of one thread stands beside it; other programs hardly disturb that. What a
+//! solid prepares once (machine code, cell map) is timed separately. The exponent is that of the
+//! least-squares line through log time on one thread against log cells.
 
 use std::fmt::Write;
 use std::time::{Duration, Instant};
@@ -214,13 +214,13 @@ fn found_volume(mesh: &Mesh) -> f64 {
     corners.map(|[a, b, c]| a.dot(b.cross(c)) / 6.0).sum()
 }
 
-/// Seconds that this thread has run, without waiting; `None` where the system does not tell.
+/// Seconds that this thread has run, without waiting; `None` where the system does not provide it.
 fn processor_time() -> Option<f64> {
     let line = std::fs::read_to_string("/proc/thread-self/schedstat").ok()?;
     line.split(' ').next()?.parse::<f64>().ok().map(|nanoseconds| 1e-9 * nanoseconds)
 }
 
-/// The most memory that this process has used, in MiB; zero where the system does not tell.
+/// The most memory that this process has used, in MiB; zero where the system does not provide it.
 fn peak_memory() -> u64 {
     let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
     let line = status.lines().find_map(|line| line.strip_prefix("VmHWM:"));

@@ -1,8 +1,9 @@
 //! What it costs that a solid moves: `cargo bench --bench moving`.
 //!
 //! A turning blade against the same blade at rest: one thread, all ways taking turns in one run, the best of
-//! several passes. Then the cell map of a machine with moving parts: how long it takes to prepare the run on all threads,
-//! and on one all cells of a window of time, of which a fluid asks for a part; and what is then near a surface.
+//! several passes. Then the cell map of a machine with moving parts: how long it takes to prepare the run on
+//! all threads, and on one all cells of a window of time, of which a fluid asks for a part; and what is then
+//! near a surface.
 
 use std::hint::black_box;
 use std::time::Instant;

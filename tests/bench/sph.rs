@@ -28,8 +28,8 @@ const BOX: Aabb = Aabb::new(DVec3::ZERO, DVec3::splat(3.0));
 const REPETITION: f64 = 0.25;
 const REPETITIONS: usize = 7;
 
-/// Support radii per spacing: 74 neighbours, as scenes with differences of pressure have them, or 45 if pressure is solved
-/// for. (With pairs of pressures scenes have 113.)
+/// Support radii per spacing: 74 neighbours, as scenes with differences of pressure have them, or 45 if
+/// pressure is solved for. (With pairs of pressures scenes have 113.)
 fn support(method: Method) -> f64 {
     if matches!(method, Method::Dfsph(_)) { 2.2 } else { 2.6 }
 }

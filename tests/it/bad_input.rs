@@ -70,7 +70,7 @@ fn long_chains() {
     check(format!("rfm 1\nlet a = {}", "x".repeat(1_000_000)), 1, "unknown name `xxx");
 }
 
-/// A check whose time is up tells what it has: the solids that were measured, and how many there are.
+/// A check whose time is up reports what it has: the solids that were measured, and how many there are.
 #[test]
 fn a_check_ends_early_with_what_it_has() {
     let measured = |solids: usize| {

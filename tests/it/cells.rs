@@ -115,8 +115,9 @@ fn gradients_together_are_those_of_each(map: &CellMap, points: &[DVec3], name: &
     }
 }
 
-/// Gradients off the surface come from leaves nearby, which are found when the first is asked for: tasks that share
-/// their threads may ask at the same time, and then no thread may wait for what another has put off.
+/// Gradients off the surface come from leaves nearby, which are found when the first is asked for: tasks that
+/// share their threads may ask at the same time, and then no thread may wait for work that another has put
+/// off.
 #[test]
 fn gradients_off_the_surface_may_be_asked_for_by_many_tasks_at_once() {
     let solid = solid(&many(300), "many", Engine::Jit);
@@ -246,8 +247,8 @@ fn contacts_are_those_of_the_solid() {
     }
 }
 
-/// No point of a ball that is said to be free lies in the solid or on it, whether a map knows it or only
-/// ranges do. Boxes that are said to be far contain no near place.
+/// No point of a ball that is reported as free lies in the solid or on it, whether a map or only ranges show
+/// that. Boxes that are reported as far contain no near place.
 #[test]
 fn what_is_said_to_be_clear_is_clear() {
     let example = |name: &str| {

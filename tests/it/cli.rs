@@ -413,7 +413,7 @@ fn commands_of_other_programs_lead_to_those_that_do_the_same() {
     {
         let text = told(command);
         assert!(text.contains(&format!("`rfm {does}` does that")), "{text}");
-        // what is told is a command
+        // what the message suggests is a command
         let name = does.split(' ').next().unwrap();
         rfm(root(), &[name, "--help"]).expect(0);
     }

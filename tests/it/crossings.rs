@@ -168,7 +168,8 @@ const GEAR: &str =
 const PRODUCT: &str =
     "solid s = x*y*z*(x - 0.3)*(y + 0.2)*(z - 0.4) >= 0.001 and box([-1, -1, -1], [1, 1, 1])";
 
-/// Two boxes nearly touch at an edge, and in one cell a tunnel leads through between them; the others only make the grid.
+/// Two boxes nearly touch at an edge, and in one cell a tunnel leads through between them; the others only
+/// make the grid.
 const TUNNEL: &str = "
     solid s = box([-0.046450, -0.044883, -0.035329], [0.046450, 0.044883, 0.035329]).rotate_x(1.6657).rotate_y(3.5890).move([0.377558, 0.203914, 0.003876]) or
     box([-0.041889, -0.047315, -0.036260], [0.041889, 0.047315, 0.036260]).rotate_x(5.1055).rotate_y(2.6745).move([0.106832, 0.997788, 0.998774]) or

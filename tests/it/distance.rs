@@ -56,14 +56,14 @@ fn axes_and_medial_surfaces_have_distances() {
     check("box() and sphere(0.2, [5, 0, 0]) or box([3, 0, 0], [4, 1, 1])", [0.0, 0.5, 0.5], 3.0);
 }
 
-/// At an edge sharper than a right angle no ray along an axis or the normal meets the solid, and no cell around the edge has
-/// its middle or a corner in it.
+/// At an edge sharper than a right angle no ray along an axis or the normal meets the solid, and no cell
+/// around the edge has its middle or a corner in it.
 #[test]
 fn the_nearest_point_may_be_on_a_sharp_edge() {
     check("x >= 0 and y >= 0 and x + y <= 1", [1.2, -0.3, 0.0], 0.13_f64.sqrt());
     check("y >= 0 and x + 2*y <= 1", [1.2, -0.3, 0.1], 0.13_f64.sqrt());
     check("x >= 0 and y >= 0 and z >= 0 and x + y + z <= 1", [1.4, -0.3, -0.2], 0.29_f64.sqrt());
-    // beside the jump of a bend nothing can be told of the nearest cells
+    // beside the jump of a bend nothing can be said about the nearest cells
     let bent = solid("box([0, 0, 0], [3, 3, 0.05]).bend(1)");
     assert!(bent.distance(DVec3::new(-1.065, 0.126, 1.981)).estimate < 1.3);
     // ω = 0 where two parts that are cut away meet, but nothing begins there

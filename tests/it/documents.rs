@@ -32,8 +32,8 @@ fn rfm_blocks(document: &str) -> Vec<String> {
     blocks(text(document))
 }
 
-/// Blends and shells take `rfm check` minutes to measure, so the solids on the page of words are compiled and looked at here:
-/// without a warning, with bounds, and with an inside.
+/// Blends and shells take `rfm check` minutes to measure, so the solids on the page of words are compiled and
+/// looked at here: without a warning, with bounds, and with an inside.
 #[test]
 fn every_block_of_the_page_of_words_makes_solids() {
     let blocks = rfm_blocks(WORDS);
@@ -113,7 +113,7 @@ fn small_examples(folder: &std::path::Path) {
     }
 }
 
-/// Commands that take long at their usual sizes, by their beginnings, and what is said behind them to make them short.
+/// Commands that take long at their usual sizes, by their beginnings, and the options that make them short.
 const SHORTER: [(&str, &str); 2] = [
     ("rfm mesh examples/pawn.rfm --simplify", "--cells 48"),
     ("rfm report examples/pawn.rfm", "--mesh-cells 32"),

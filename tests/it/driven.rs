@@ -39,8 +39,9 @@ scene flow {{
     let both = mean_turn(&format!("{drum}.rotate_z(2*t)"), ", surface_velocity: [-2*y, 2*x, 0]");
     let still = mean_turn(drum, "");
     assert!(still.abs() < 1e-3 && belt > 0.05, "{still} {belt}");
-    // the map of what a body takes of kernels turns with it, and is right to 0.0006; so particles that are moved apart beside the
-    // drum begin elsewhere, some by 0.4 spacings, which makes up to three hundredths of eight spacings
+    // the map of what a body takes of kernels turns with it, and is right to 0.0006; so particles that are
+    // moved apart beside the drum begin elsewhere, some by 0.4 spacings, which makes up to three hundredths
+    // of eight spacings
     assert!((turning / belt - 1.0).abs() < 0.04, "{turning} {belt}");
     // what is stated takes the place of what the motion says
     assert!((both / turning - 1.0).abs() < 1e-6, "{both} {turning}");
@@ -69,8 +70,9 @@ fn times(text: &str, until: f64) -> Vec<f64> {
     times
 }
 
-/// Water that moves with its tank moves as in a tank at rest: along and across the walls, lifted, and turned as a whole.
-/// (When `dfsph` continued velocities behind walls as if these were at rest, 5 m/s stirred the water to 0.9 m/s.)
+/// Water that moves with its tank moves as in a tank at rest: along and across the walls, lifted, and turned
+/// as a whole. (When `dfsph` continued velocities behind walls as if these were at rest, 5 m/s stirred the
+/// water to 0.9 m/s.)
 #[test]
 fn a_tank_carries_its_water_along() {
     let stirred = |method: &str, motion: &str, velocity: [&str; 3]| {
@@ -109,7 +111,7 @@ fn a_tank_carries_its_water_along() {
     }
 }
 
-/// Nothing falls and the fluid is at rest, so that nothing but the ball limits the steps.
+/// Nothing falls and the fluid is at rest, so only the ball limits the steps.
 #[test]
 fn steps_follow_a_body_in_a_fluid_at_rest() {
     let flow = |motion: &str| {
@@ -139,8 +141,8 @@ fn steps_follow_a_body_in_a_fluid_at_rest() {
     let waits = times(&flow("5*max(t - 0.3, 0)"), 0.32);
     let before = waits.iter().filter(|t| **t <= 0.29).count();
     assert!(before < 10 && waits.len() > before + 4, "{before} of {} steps", waits.len());
-    // one that jumps is let jump: no step is short enough for its way. The short steps before it stir nothing: the fluid gives
-    // way by the centimetre, and gets no speed of that
+    // a body that jumps may jump: no step is short enough for its way. The short steps before it stir
+    // nothing: the fluid gives way by the centimetre, and gets no speed of that
     let jumps = times(&flow("0.01*floor(10*t)"), 0.25).len();
     assert!((4..1000).contains(&jumps), "{jumps} steps");
     let speed = run(&flow("0.01*floor(10*t)").replace("1 s", "0.25 s")).unwrap().speed();
@@ -335,8 +337,9 @@ scene carry {
     }
 }
 
-/// A body that changes its shape by nothing to speak of leaves water at rest as one does that stands still: without maps of its
-/// volume the closed forms of its bent faces threw particles of three spacings away at 7 m/s.
+/// A body that hardly changes its shape leaves water at rest, as a body at rest does. Without maps of its
+/// volume, the closed forms of the bent faces of a ball three spacings in radius threw particles away at 7
+/// m/s.
 #[test]
 fn a_shape_that_hardly_changes_leaves_water_at_rest() {
     let fastest = |change: &str| {
@@ -381,14 +384,14 @@ scene s {
     let weight = 9810.0 * 4.0 / 3.0 * std::f64::consts::PI * 0.25_f64.powi(3);
     let speed = simulation.audit().max_speed();
     println!("{force} N for {weight} N, at most {speed} m/s");
-    // its radius is four spacings, the water still sways, and particles that were pushed aside lie less densely: 7 % too much,
-    // 3 % with twice as many. The surface moves at 0.2 m/s
+    // its radius is four spacings, the water still sways, and particles that were pushed aside lie less
+    // densely: 7 % too much, 3 % with twice as many particles. The surface moves at 0.2 m/s
     assert!((force / weight - 1.0).abs() < 0.1, "{force} N for {weight} N");
     assert!(speed < 0.8, "{speed} m/s");
 }
 
-/// A ball that swings fast, and not far, in a box full of water: the fluid moves along with half of the ball's volume, if its
-/// sound is fast enough for it.
+/// A ball that swings fast, and not far, in a box full of water: the fluid moves along with half of the
+/// ball's volume, if its sound is fast enough for it.
 #[test]
 fn a_ball_that_swings_has_the_added_mass_of_half_its_volume() {
     let text = "rfm 1

@@ -1,5 +1,5 @@
-//! What editors know of the language: the words of their grammars are those of the one grammar, and every example is read by
-//! all that read files here.
+//! What editors know of the language: the words of their grammars are those of the one grammar, and every
+//! example is read by all that read files here.
 
 use std::collections::BTreeSet;
 

@@ -23,8 +23,8 @@ scene enclosed {
   truth     { velocity: [-y*turn, x*turn, 0], from: 1.5 s }
 }";
 
-/// A number of particles fills the whole shape. A lattice whose top layers are left out instead holds the fluid's mass in less
-/// room: 13 % too dense, for the 3000 particles beside a post.
+/// A number of particles fills the whole shape. A lattice whose top layers are left out instead holds the
+/// fluid's mass in less room: 13 % too dense, for the 3000 particles beside a post.
 #[test]
 fn a_number_of_particles_fills_the_shape() {
     let reach = "0 <= x <= 0.4 and 0 <= y <= 1 and 0 <= z <= 0.8";
@@ -66,8 +66,8 @@ scene dam {{
     }
 }
 
-/// Ordinary shapes whose sides no lattice divides, some with a vessel of the same shape around them: a tank, a jet, a column
-/// of honey, a bent tube.
+/// Ordinary shapes whose sides no lattice divides, some with a vessel of the same shape around them: a tank,
+/// a jet, a column of honey, a bent tube.
 const SHAPES: [(&str, &str, usize); 4] = [
     ("box([0, 0, 0], [0.6, 0.2, 0.15])", "box { max: [0.6, 0.2, 0.4] }", 3000),
     ("cylinder(0.05, 1.1).move([0.02, 0, 0.45])", "box { min: [-0.5, -0.5, 0], max: [0.5, 0.5, 1.6] }", 2000),
@@ -83,9 +83,10 @@ const SHAPES: [(&str, &str, usize); 4] = [
     ),
 ];
 
-/// A fluid with a stated number of particles starts as dense as it is, so it neither bursts nor grows. (With vacancies in a
-/// lattice that was too dense elsewhere, these started 2, 12, 10 and 13 % too dense and grew by 1 to 3 % of their volume; with
-/// `dfsph` the fluid in the tube paid a debt of its start and doubled its energy in four steps.)
+/// A fluid with a stated number of particles starts as dense as it is, so it neither bursts nor grows. (With
+/// vacancies in a lattice that was too dense elsewhere, these started 2, 12, 10 and 13 % too dense and grew
+/// by 1 to 3 % of their volume; with `dfsph` the fluid in the tube paid a debt of its start and doubled its
+/// energy in four steps.)
 #[test]
 fn a_number_of_particles_is_as_dense_as_the_fluid() {
     for (shape, room, number) in SHAPES {
@@ -143,8 +144,9 @@ scene pool {{
     }
 }
 
-/// A lake and a wet bed, and two pools with a wall between them: layers as high as the particles' spacing would end beside one
-/// of the surfaces, and the shallow water would be too much by 7 %, the deep one too little by 3 %.
+/// A lake and a wet bed, and two pools with a wall between them: layers as high as the particles' spacing
+/// would end beside one of the surfaces, and the shallow water would be too much by 7 %, the deep one too
+/// little by 3 %.
 #[test]
 fn every_level_of_a_fluid_is_filled() {
     let wall = "solid wall = box([0.95, -1, -1], [1.05, 2, 2])";
@@ -175,8 +177,8 @@ scene levels {{
     }
 }
 
-/// A half-space has no bounds of its own, but those that the box leaves it. (Of 4000 particles 859 were taken away with the
-/// corners of the box, and nothing came in their place.)
+/// A half-space has no bounds of its own, but those that the box leaves it. (Without this, 859 of 4000
+/// particles were removed with the corners of the box, and none took their place.)
 #[test]
 fn a_number_of_particles_fills_a_half_space_in_a_container() {
     let text = "rfm 1
@@ -199,8 +201,8 @@ scene still {
     assert!((mean / 0.25 - 1.0).abs() < 0.01, "{mean}");
 }
 
-/// A fluid that fills its vessel is packed and becomes a little lighter, and says so. Particles that are left out at the
-/// walls instead leave gaps, and the flow deviates by 63 %.
+/// A fluid that fills its vessel is packed and becomes a little lighter, and says so. Particles that are left
+/// out at the walls instead leave gaps, and the flow deviates by 63 %.
 #[test]
 fn a_fluid_that_fills_its_vessel_is_packed() {
     let program = Program::from_source("enclosed.rfm", ENCLOSED).unwrap_or_else(|e| panic!("{e}"));
@@ -208,7 +210,7 @@ fn a_fluid_that_fills_its_vessel_is_packed() {
     let start = experiment.start().unwrap_or_else(|e| panic!("{e}"));
     let said: Vec<_> = start.warnings.list.iter().map(|warning| warning.code.0).collect();
     assert_eq!(said, ["W0507"]);
-    // the lattice has so many sites more than the fluid has cells
+    // the lattice has this number of sites more than the fluid has cells
     assert!(start.carved <= 5, "{}", start.carved);
     let mut simulation = start.simulation;
     let mass = simulation.parameters().particle_mass * simulation.particles().len() as f64;
@@ -226,9 +228,9 @@ fn a_fluid_that_fills_its_vessel_is_packed() {
     assert!(velocity.is_some_and(|velocity| velocity < 0.15), "{velocity:?}");
 }
 
-/// The particles of a full vessel become lighter at the start, and a run that goes on from a checkpoint has to know all that
-/// follows from that. (What kernels miss before a surface was that of the stated mass in the one, and of the lighter one in the
-/// other.)
+/// The particles of a full vessel become lighter at the start, and a run that goes on from a checkpoint has
+/// to know all that follows from that. (What kernels miss before a surface was that of the stated mass in the
+/// one, and of the lighter one in the other.)
 #[test]
 fn a_full_vessel_goes_on_with_the_same_bits() {
     let text = "rfm 1
@@ -252,9 +254,9 @@ scene full {
     assert!(straight.checkpoint() == resumed.checkpoint());
 }
 
-/// What is told of walls that no particle reaches: of a cylinder on a floor, less with a smaller spacing; nothing where the
-/// floor is 45 degrees away, where the shape is only the room for a number of particles of a stated size, or where a lattice
-/// does not fit a plate.
+/// Warnings about walls that no particle reaches: of a cylinder on a floor, less with a smaller spacing; none
+/// where the floor is 45 degrees away, where the shape is only the room for a number of particles of a stated
+/// size, or where a lattice does not fit a plate.
 #[test]
 fn walls_without_particles_are_told_of() {
     let said = |solid: &str, fluid: &str| {
@@ -278,8 +280,8 @@ scene rest {{
         })
     };
     let roll = "cylinder(0.4, 4).rotate_x(90 deg).move([1, 2, 0.4])";
-    // particles reach to √(2Rs) = 0.13 and 0.06 m before the line where walls touch, and two spacings farther none is near: 0.09
-    // and 0.05 m of the 0.63 m along the cylinder, where the load is greatest
+    // particles reach to √(2Rs) = 0.13 and 0.06 m before the line where walls touch, and two spacings farther
+    // none is near: 0.09 and 0.05 m of the 0.63 m along the cylinder, where the load is greatest
     let (coarse, fine) = (said(roll, "spacing: 0.02").unwrap(), said(roll, "spacing: 0.005").unwrap());
     assert!((8.0..20.0).contains(&coarse) && (5.0..14.0).contains(&fine) && fine < coarse, "{coarse} {fine}");
     assert_eq!(said("half_space([-1, 0, 1], [0.5, 0, 0])", "spacing: 0.02"), None);

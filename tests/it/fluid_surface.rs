@@ -193,7 +193,7 @@ fn surfaces_go_with_the_run_that_they_were_made_of() {
     assert!(render(2).stderr.contains("frame 0, at 0 s, has no surface"));
     rfm(here, &["render", "drop.out", "--surface", "--frames", "1..", "-o", "pictures"]).expect(0);
 
-    // older versions did not tell what surfaces were made of
+    // older versions did not record what surfaces were made of
     std::fs::remove_file(surface.join("surface.json")).unwrap();
     rfm(here, &["render", "drop.out", "--surface", "--frames", "1..", "-o", "pictures"]).expect(0);
 }

@@ -1,6 +1,6 @@
 //! `rfm fmt`: the layout changes no value, is found at once, and leaves alone what is not understood.
 //!
-//! `RFM_PROGRAMS=10000 cargo test --test it layout` tries so many random programs.
+//! `RFM_PROGRAMS=10000 cargo test --test it layout` tries that number of random programs.
 
 #[path = "layout/programs.rs"]
 mod programs;

@@ -79,7 +79,7 @@ fn devices_pipes_and_links_stay_what_they_are() {
     let folder = tempfile::tempdir().unwrap();
     let here = folder.path();
     std::fs::write(here.join("drop.rfm"), SMALL).unwrap();
-    // links, so that a test that fails harms nobody
+    // links, so that a failing test does no harm
     symlink("/dev/null", here.join("null.stl")).unwrap();
     symlink("part.stl", here.join("link.stl")).unwrap();
     std::fs::write(here.join("part.stl"), "old").unwrap();

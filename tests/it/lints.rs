@@ -70,7 +70,7 @@ fn operands_are_idle_by_all_of_the_formula() {
         idle("sphere(0.3) or (x <= 2 and sphere(1)) or sphere(0.4)"),
         ["sphere(0.3)", "x <= 2", "sphere(0.4)"]
     );
-    // what lies in an operand that may go is not told of again
+    // what lies in an operand that may go is not reported again
     assert_eq!(idle("sphere(1) and (sphere(2) and sphere(1.5) or x <= -5)").len(), 1);
     assert_eq!(idle("sphere(2) and (x <= 3 or y <= 3)"), ["(x <= 3 or y <= 3)"]);
     assert_eq!(idle("box([0, 0, 0], [1, 1, 1]) and x <= 1.5"), ["x <= 1.5"]);
@@ -172,7 +172,8 @@ fn a_divisor_that_is_zero_where_omega_has_a_limit_is_no_pole() {
     }
 }
 
-/// Among 200 divisors that are zero without harm, because a constant takes the place of their quotients there, one harms.
+/// Among 200 divisors that are zero without harm, because a constant takes the place of their quotients
+/// there, one harms.
 #[test]
 fn a_pole_is_found_among_many_quotients() {
     let guarded = |i: usize| {
@@ -298,7 +299,7 @@ fn flows_that_are_validated_check_without_a_word() {
     }
 }
 
-/// The budget counts the work: what is found before it ends is right, and that it has ended is said.
+/// The budget counts the work: what is found before it ends is right, and the end of the budget is reported.
 #[test]
 fn a_search_that_is_cut_says_so() {
     let shape = "all i in 0..100: x + 0.01*sin(i)*y*z*x^2 + 0.01*cos(i)*z^2*y <= 5 + i";
@@ -318,7 +319,7 @@ fn a_search_that_is_cut_says_so() {
     assert_eq!(solid.idle_operands(source, &mut { whole }), all);
 }
 
-/// A run tells of what its fluid meets, once: it is not told again when the run goes on.
+/// A run reports what its fluid meets, once: not again when the run goes on.
 #[test]
 fn a_run_tells_of_what_its_fluid_meets() {
     for (case, code) in [("no_value_in_the_fluid", "W0418"), ("wall_thinner_than_the_spacing", "W0508")] {

@@ -1,4 +1,5 @@
-//! How pictures look: small pictures that were looked at are kept in `tests/pictures`, and new ones are compared with them.
+//! How pictures look: small pictures that were looked at are kept in `tests/pictures`, and new ones are
+//! compared with them.
 //!
 //! `RFM_PICTURES=write` keeps what is drawn now. Look at the pictures before they are committed.
 
@@ -30,8 +31,8 @@ fn pixels(file: &[u8]) -> Vec<u8> {
     pixels
 }
 
-/// Compares a picture with the one that is kept. Programs for surfaces may round otherwise on other processors, so a few
-/// pixels at borders may differ.
+/// Compares a picture with the one that is kept. Programs for surfaces may round otherwise on other
+/// processors, so a few pixels at borders may differ.
 fn compare(here: &Path, name: &str) {
     let kept = root().join("tests/pictures").join(name);
     let drawn = std::fs::read(here.join(name)).unwrap();

@@ -25,7 +25,7 @@ impl Editor {
         Self::able(encodings, json!({}))
     }
 
-    /// An editor that can do with texts what it tells.
+    /// An editor that can apply to texts what the server sends.
     pub fn able(encodings: &[&str], text: Value) -> Self {
         let mut server = Command::new(env!("CARGO_BIN_EXE_rfm"))
             .arg("lsp")
@@ -489,7 +489,7 @@ fn behind_an_import_stands_what_it_defines() {
     editor.end();
 }
 
-/// A wall that the particles of a scene are too large for is told of once the text rests.
+/// A wall that is too thin for the particles of a scene is reported once the text rests.
 #[test]
 fn what_particles_do_not_show_is_told() {
     let file = root().join("tests/cases/scene_error/wall_thinner_than_the_spacing.rfm");

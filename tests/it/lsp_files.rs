@@ -177,7 +177,7 @@ fn open_texts_count_and_not_those_of_the_disk() {
     desk.editor.end();
 }
 
-/// Of many changes that come together only the last one is read.
+/// If many changes come together, only the last one is read.
 #[test]
 fn changes_that_come_together_are_read_once() {
     let mut text = String::from("rfm 1\n");

@@ -18,7 +18,7 @@ fn asked(id: impl Into<Value>, more: Value) -> Value {
     json!({ "jsonrpc": "2.0", "id": id.into(), "method": "workspace/executeCommand", "params": params })
 }
 
-/// The answers to so many requests, in the order in which they come.
+/// The answers to the given number of requests, in the order in which they come.
 fn answers(editor: &mut Editor, count: usize) -> Vec<Value> {
     let all = std::iter::repeat_with(|| editor.read());
     all.filter(|message| !message["id"].is_null()).take(count).collect()

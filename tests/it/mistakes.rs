@@ -1,5 +1,5 @@
-//! Small mistakes by theme, many to a snapshot: each is read as the person who made it. What a message tells to write
-//! is accepted as it stands.
+//! Small mistakes by theme, many to a snapshot: read each as the person who made it would. What a message
+//! suggests is accepted as it stands.
 
 mod commands;
 
@@ -405,7 +405,7 @@ fn messages(text: &str) -> Diagnostics {
     all
 }
 
-/// What a message tells to write, between backticks behind the word `write`.
+/// What a message suggests, between backticks behind the word `write`.
 fn told(help: &str) -> Vec<&str> {
     let mut told = Vec::new();
     for part in help.split("write ").skip(1) {
@@ -460,7 +460,7 @@ fn is_accepted(code: &str) -> bool {
     tried.iter().any(|text| program(text).is_ok())
 }
 
-/// One snapshot of a theme, and a look at everything that its messages tell to write.
+/// One snapshot of a theme, and a check of everything that its messages suggest.
 fn read(theme: &str, texts: impl IntoIterator<Item = (String, String)>) {
     let (mut all, mut refused) = (String::new(), String::new());
     for (title, text) in texts {

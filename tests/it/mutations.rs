@@ -1,8 +1,8 @@
-//! Files with random damage: whatever a file holds, reading it, laying it out and asking a language server about it neither
-//! panics nor takes long or much memory.
+//! Files with random damage: whatever a file holds, reading it, laying it out and asking a language server
+//! about it neither panics nor takes long or much memory.
 //!
-//! `RFM_MUTATIONS=3600 cargo test --test it mutations` goes on for so many seconds, with other mutations each time. A case
-//! that fails is printed as it stands.
+//! `RFM_MUTATIONS=3600 cargo test --test it mutations` goes on for that number of seconds, with other
+//! mutations each time. A case that fails is printed as it stands.
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::{Path, PathBuf};
@@ -18,7 +18,7 @@ use rfm::{Engine, Experiment, Program};
 use crate::lsp::Editor;
 use crate::tool::root;
 
-/// Longest time for one file, and the most memory, bytes, that the process may come to.
+/// Longest time for one file, and the most memory, bytes, that the process may use.
 const LONGEST: Duration = Duration::from_secs(2);
 const MOST_MEMORY: f64 = 1e9;
 
@@ -234,8 +234,8 @@ fn read(text: &str) {
     }
 }
 
-/// Lays a file out: its layout is its own layout. That it has the same tree and comments is what [`format`] itself compares;
-/// it would say that the file cannot be formatted.
+/// Lays a file out: its layout is its own layout. That it has the same tree and comments is what [`format`]
+/// itself compares; it would say that the file cannot be formatted.
 fn lay_out(text: &str) {
     for spelling in [Spelling::Written, Spelling::Unicode, Spelling::Ascii] {
         match format(&Source::file("m.rfm", text), spelling) {
@@ -290,7 +290,7 @@ fn corpus() -> Vec<Vec<char>> {
     paths.iter().filter_map(|path| std::fs::read_to_string(path).ok()).map(|t| t.chars().collect()).collect()
 }
 
-/// The processor time of this process, or the time where the system does not tell.
+/// The processor time of this process, or the time where the system does not provide it.
 #[cfg(unix)]
 fn processor_time() -> Duration {
     let time = rustix::time::clock_gettime(rustix::time::ClockId::ProcessCPUTime);
@@ -302,7 +302,7 @@ fn processor_time() -> Duration {
     SystemTime::now().duration_since(SystemTime::UNIX_EPOCH).unwrap_or_default()
 }
 
-/// The processor time of another process; `None` where the system does not tell.
+/// The processor time of another process; `None` where the system does not provide it.
 fn processor_time_of(process: u32) -> Option<Duration> {
     let all = std::fs::read_to_string(format!("/proc/{process}/stat")).ok()?;
     // in hundredths of a second, behind the name in brackets and eleven other fields
@@ -323,7 +323,7 @@ fn time(work: impl FnOnce()) -> Result<Duration, String> {
     })
 }
 
-/// The most memory that a process has had, bytes; 0 where the system does not tell.
+/// The most memory that a process has had, bytes; 0 where the system does not provide it.
 fn peak_memory(process: u32) -> f64 {
     let status = std::fs::read_to_string(format!("/proc/{process}/status")).unwrap_or_default();
     let line = status.lines().find_map(|line| line.strip_prefix("VmHWM:"));

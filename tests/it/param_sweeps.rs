@@ -254,7 +254,7 @@ fn runs_have_their_audit_and_the_means_of_probes() {
 #[test]
 fn a_report_has_the_errors_of_a_flow() {
     let text = std::fs::read_to_string(root().join("examples/validation/free_fall.rfm")).unwrap();
-    // what is said to be known is right for k = 1 only
+    // what is stated as known is right for k = 1 only
     let text = text.replace("-9.81*t]", "-9.81*k*t]").replacen("rfm 1\n", "rfm 1\nparam k = 1\n", 1);
     let folder = in_folder(&text);
     let report = |sweep: &str| {
@@ -354,7 +354,7 @@ fn volumes_that_are_not_resolved_are_told_in_the_table() {
     let folder = in_folder(
         "rfm 1\nparam r = 0.2 in 0.05 .. 0.9\nsolid pin = box([0, 0, 0], [1, 1, 0.5]) \\ cylinder(r, 2).move([0.5, 0.5, -0.5])\n",
     );
-    // what is given for a swept param is not used, and that is told
+    // what is given for a swept param is not used, and a message says so
     let outcome = rfm(folder.path(), &["check", "a.rfm", "--sweep", "r=0.3..0.7:2", "-D", "r=0.4"]).expect(0);
     assert!(outcome.stderr.contains("the value that is given for `r` is not used"), "{}", outcome.stderr);
     let lines: Vec<&str> = outcome.stdout.lines().collect();

@@ -51,8 +51,8 @@ impl Random {
     }
 }
 
-/// The sign of a profile is that of a distance from the true outline, but for points closer to it than a tolerance; each
-/// tolerance is needed: somewhere the chords are a tenth of it away.
+/// The sign of a profile is that of a distance from the true outline, but for points closer to it than a
+/// tolerance; each tolerance is needed: somewhere the chords are a tenth of it away.
 #[track_caller]
 fn follows(definition: &str, truth: impl Fn(DVec2) -> f64, tolerance: f64) {
     let found = solid(definition);
@@ -120,7 +120,7 @@ fn pieces_are_joined() {
     follows("polygon([[-2, -2], [2, -2], arc([2, -1], [1, 0], [2, 1]), [2, 2], [-2, 2]])", bitten, 1.01e-3);
 }
 
-/// Through 24 points of an ellipse the spline is 1e-3 away at most.
+/// Through 24 points of an ellipse the spline is at most 1e-3 away.
 #[test]
 fn splines_follow_smooth_outlines() {
     let ellipse = |p: DVec2| {
@@ -296,8 +296,8 @@ fn a_loft_between_circles_is_a_cone() {
     assert!(allowed.union(&bounds) == allowed, "{bounds:?}");
 }
 
-/// From a star to a disc that stands beside its middle: the sign is that of the weighed distances, and the gradient is that of
-/// differences.
+/// From a star to a disc that stands beside its middle: the sign is that of the weighed distances, and the
+/// gradient is that of differences.
 #[test]
 fn a_loft_weighs_two_outlines() {
     let star =
@@ -321,7 +321,7 @@ fn a_loft_weighs_two_outlines() {
         let h = 1e-6;
         let slope = |axis: DVec3| (loft.omega(p + h * axis) - loft.omega(p - h * axis)) / (2.0 * h);
         let differences = DVec3::new(slope(DVec3::X), slope(DVec3::Y), slope(DVec3::Z));
-        // differences across a crease tell nothing: those are few
+        // differences across a crease say nothing: there are few of those
         compared += usize::from((gradient - differences).length() < 1e-4 * (1.0 + gradient.length()));
     }
     assert!(compared > 19_900, "{compared}");

@@ -352,7 +352,8 @@ fn slopes_hold_between_any_two_points_whatever_jumps_between_them() {
     }
 }
 
-/// Where the operands of a minimum are equal, as the faces of a rounded shape are beside its edges, its slopes are theirs.
+/// Where the operands of a minimum are equal, as the faces of a rounded shape are beside its edges, its
+/// slopes are theirs.
 #[test]
 fn slopes_of_a_rounded_box_are_those_of_its_plane_faces() {
     let text = "rfm 1\nsolid s = box([-0.5, -0.4, -0.3], [0.5, 0.4, 0.3]).rotate([1, 2, 3], 0.6).round(5 cm)";

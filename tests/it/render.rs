@@ -339,7 +339,7 @@ fn videos_are_handed_to_the_program_of_the_system() {
     let outcome = render();
     let text = String::from_utf8_lossy(&outcome.stderr).into_owned();
     assert!(outcome.status.code() == Some(2) && text.contains("write .gif or .apng"), "{text}");
-    // a program that keeps what it is told and given
+    // a program that keeps its arguments and its input
     let script = |body: &str| {
         let path = tools.join("ffmpeg");
         std::fs::write(&path, format!("#!/bin/sh\n[ \"$1\" = -version ] && exit 0\n{body}\n")).unwrap();
@@ -359,7 +359,7 @@ fn videos_are_handed_to_the_program_of_the_system() {
     assert!(outcome.status.success() && note.contains("white border and has 66x50"), "{note}");
     let told = std::fs::read_to_string(here.join("told")).unwrap();
     assert!(told.contains("-s 65x49") && told.contains("-vf pad=66:50:0:0:white"), "{told}");
-    // one that fails: its last words are told, and the film that was there stays
+    // one that fails: its last words are shown, and the film that was there stays
     script("echo 'Unknown encoder libx264' >&2\nexit 1");
     let outcome = render();
     let text = String::from_utf8_lossy(&outcome.stderr).into_owned();
@@ -430,7 +430,7 @@ fn a_solid_that_moves_becomes_a_film() {
     assert!(bytes("1.gif") == bytes("2.gif") && bytes("1.gif").len() > 1000);
 }
 
-/// Glass that is cut open lets what lies before it be seen: the picture is another one, and the title tells where it was cut.
+/// Glass that is cut open looks different, and the title says where it was cut.
 #[test]
 fn glass_is_cut_open_like_stone() {
     let folder = tempfile::tempdir().unwrap();

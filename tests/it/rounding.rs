@@ -38,13 +38,14 @@ fn is(definition: &str, within: f64, known: impl Fn(DVec3) -> f64) {
     }
 }
 
-/// The distance from a box with round edges, negative inside: that from the box that is smaller by r on all sides, less r.
+/// The distance from a box with round edges, negative inside: that from the box that is smaller by r on all
+/// sides, less r.
 fn round_box(p: DVec3, half: DVec3, r: f64) -> f64 {
     let q = p.abs() - half + r;
     q.max(DVec3::ZERO).length() + q.max_element().min(0.0) - r
 }
 
-/// The same of a profile of which both distances are known.
+/// The exact value for a profile of which both distances are known.
 fn round_corner(a: f64, b: f64, r: f64) -> f64 {
     let q = DVec2::new(a, b) + r;
     q.max(DVec2::ZERO).length() + q.max_element().min(0.0) - r
@@ -199,8 +200,8 @@ fn ranges_hold_over_a_million_boxes() {
     }
 }
 
-/// Rounded shapes against the formulas of their distances, which are written in the language and computed with 120 digits. The
-/// value is off by four rounding errors of the largest coordinate at most.
+/// Rounded shapes against the formulas of their distances, which are written in the language and computed
+/// with 120 digits. The value is off by at most four rounding errors of the largest coordinate.
 #[test]
 fn values_are_those_of_the_distance_to_the_last_digits() {
     let arc = |a: &str, b: &str, r: f64| {

@@ -184,11 +184,11 @@ fn files_of_others_are_not_replaced() {
             run(here, &[&out, "--force"]).expect(0);
         }
     }
-    // a run that was stopped before its first frame may begin anew
+    // a run that was stopped before its first frame may begin again
     std::fs::create_dir_all(here.join("begun/history")).unwrap();
     std::fs::write(here.join("begun/history/audit.csv"), "time [s]\n").unwrap();
     run(here, &["begun"]).expect(0);
-    // what a run does not write is in nobody's way
+    // files that a run does not write do no harm
     std::fs::create_dir_all(here.join("mine/probes")).unwrap();
     std::fs::write(here.join("mine/probes/other.csv"), "a,b\n").unwrap();
     run(here, &["mine"]).expect(0);
@@ -382,7 +382,7 @@ fn two_runs_never_share_a_folder() {
         let refused = run(here, &["out", how]).expect(2).stderr;
         assert!(refused.contains("another run is writing into `out`"), "{refused}");
     }
-    // a run that is killed leaves its lock to nobody, and its temporary files to the next
+    // a run that is killed releases its lock, and leaves its temporary files to the next
     first.kill().unwrap();
     first.wait().unwrap();
     for part in ["out/.rfm-summary.json-abc", "out/frames/.rfm-def"] {

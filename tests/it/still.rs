@@ -7,7 +7,7 @@ use rfm::sph::Simulation;
 
 use crate::tool::simulation;
 
-/// A column of eight particles by eight, so many layers deep.
+/// A column of eight particles by eight, and `layers` deep.
 fn column(layers: u32) -> String {
     format!(
         "rfm 1
@@ -21,8 +21,9 @@ scene deep {{
     )
 }
 
-/// Eighty layers on a lattice, whose first steps are the hardest that `dfsph` meets: nothing is too dense in them, all of the
-/// pressure is to be found at once, and a column that falls for some steps does not stop in time. (It reached 0.5 m/s.)
+/// Eighty layers on a lattice, whose first steps are the hardest that `dfsph` meets: nothing is too dense in
+/// them, all of the pressure is to be found at once, and a column that falls for some steps does not stop in
+/// time. (It reached 0.5 m/s.)
 #[test]
 fn a_deep_column_stands_from_the_first_step() {
     let mut simulation = simulation(&column(80));
@@ -57,8 +58,9 @@ fn steps_are_short_enough_for_the_pressure() {
     assert!(deepest > 5000.0, "{deepest} Pa: the pressure never came");
 }
 
-/// Water that tapers off between a cylinder and the floor it lies on. Walls on both sides complete what pressure does there, so
-/// steps that are short enough for the depth are not for the wedge: particles reached 148 m/s.
+/// Water that tapers off between a cylinder and the floor it lies on. Walls on both sides complete what
+/// pressure does there, so steps that are short enough for the depth are not for the wedge: particles reached
+/// 148 m/s.
 #[test]
 fn steps_are_short_enough_for_a_wedge() {
     let mut simulation = simulation(
@@ -104,8 +106,9 @@ scene calm {
     assert!(fastest < 1e-3, "{fastest} m/s");
 }
 
-/// A gravity that depends on the place is weight, too: walls bear their share of the surface under it. (Without that share
-/// the pressure would be a tenth of a layer too high, 2 %; were the diffusion of densities not to know of the weight, 8 %.)
+/// A gravity that depends on the place is weight, too: walls bear their share of the surface under it.
+/// (Without that share the pressure would be a tenth of a layer too high, 2 %; were the diffusion of
+/// densities not to know of the weight, 8 %.)
 #[test]
 fn walls_bear_their_share_under_any_gravity() {
     let mut simulation = simulation(
@@ -131,8 +134,8 @@ scene rest {
     assert!(off < 0.02, "{off}");
 }
 
-/// A block that has fallen into its tank comes to rest as deep as its volume says, and presses as its weight does. (With `wcsph`
-/// it stood 15 % too high, and pressed 29 % too much at a third of its depth.)
+/// A block that has fallen into its tank comes to rest as deep as its volume says, and presses as its weight
+/// does. (With `wcsph` it stood 15 % too high, and pressed 29 % too much at a third of its depth.)
 #[test]
 fn water_that_has_splashed_fills_no_more_than_its_volume() {
     for method in ["wcsph", "dfsph"] {
@@ -162,9 +165,9 @@ fn water_that_has_splashed_fills_no_more_than_its_volume() {
     }
 }
 
-/// Where pressures act by their differences, gradients are those of the neighbours that a particle has, at walls and in corners
-/// too. (By closed forms of what whole walls take, this water, which has hardly any viscosity, moved at 70 mm/s after half a
-/// second and at 100 after two.)
+/// Where pressures act by their differences, gradients are those of the neighbours that a particle has, at
+/// walls and in corners too. (By closed forms of what whole walls take, this water, which has hardly any
+/// viscosity, moved at 70 mm/s after half a second and at 100 after two.)
 #[test]
 fn differences_of_pressure_rest_in_edges_and_corners() {
     let mut simulation = simulation(

@@ -136,7 +136,7 @@ fn feature(kind: &str, random: &mut Random) -> Feature {
     }
 }
 
-/// Features that the mesh does not show and nobody has counted.
+/// Features that the mesh does not show and that were not counted.
 fn missed(count: u64) -> Vec<String> {
     let mut missed = Vec::new();
     for kind in ["bump", "spike", "tunnel", "slit", "shell"] {
@@ -204,7 +204,8 @@ fn faces_that_coincide_and_smooth_surfaces_hide_nothing() {
     }
 }
 
-/// No grid shows all of a wedge: it is counted, and told from a wall. Its volume is measured all the same.
+/// No grid shows all of a wedge: it is counted, and distinguished from a wall. Its volume is measured all the
+/// same.
 #[test]
 fn wedges_are_told_from_walls() {
     let (_, wedge) = looked_at(&solid("polygon([[0, 0], [1, 0], [1, 0.577]]).extrude(0, 1)"), 96);
@@ -221,7 +222,7 @@ fn wedges_are_told_from_walls() {
         "box([0, 0, 0], [1, 1, 0.1]) or cylinder(0.002, 0.8).rotate_y(90 deg).move([0.1, 0.437, 0.107])";
     let (_, wire) = looked_at(&solid(wire), 96);
     assert!(wire.count > 0 && !wire.is_wedge, "{wire:?}");
-    // where there are both, the wall is told
+    // where there are both, the wall is reported
     let both = "polygon([[0, 0], [1, 0], [1, 0.577]]).extrude(0, 1) or box([0, 1, 0], [1, 1.003, 1])";
     let (_, both) = looked_at(&solid(both), 48);
     assert!(!both.is_wedge && (both.thickness - 0.003).abs() < 1e-6, "{both:?}");

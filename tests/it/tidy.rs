@@ -6,12 +6,12 @@ use crate::tool::root;
 
 /// A module, and the modules of the crate that it may use besides itself; `*` is all.
 ///
-/// Departures from the plan, with their reasons: `field` uses `interval`, the type of a guaranteed range;
-/// `simplify`, `codegen` and `solid` use `diagnostic` for the spans that nodes carry; `codegen` uses `geom`
-/// for the reach of range programs; `lower` uses `geom` for the boxes of scenes, `sph` for the keys that its
-/// methods declare, and `lettering` for the outlines of texts; `solid` uses `simplify`, because a gradient is
-/// derived and simplified when it is first asked for; `compile` opens the file that `Program::from_path` names, and uses `geom` for the box of
-/// a tolerance.
+/// Uses that need a reason: `field` uses `interval`, the type of a guaranteed range; `simplify`, `codegen`
+/// and `solid` use `diagnostic` for the spans that nodes carry; `codegen` uses `geom` for the reach of range
+/// programs; `lower` uses `geom` for the boxes of scenes, `sph` for the keys that its methods declare, and
+/// `lettering` for the outlines of texts; `solid` uses `simplify`, because a gradient is derived and
+/// simplified when it is first asked for; `compile` opens the file that `Program::from_path` names, and uses
+/// `geom` for the box of a tolerance.
 const MAY_USE: &[(&str, &[&str])] = &[
     ("diagnostic", &[]),
     ("geom", &[]),

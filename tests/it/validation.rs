@@ -354,8 +354,8 @@ fn a_channel_that_closes_on_itself_has_its_profile() {
     velocity_within("poiseuille", &[("particles", 2413.0)], 0.05);
 }
 
-/// A block of water flies into the corner of a plate and a floor, along which it slides or at which it sticks. Nothing else
-/// acts on it, so that both together take what it loses.
+/// A block of water flies into the corner of a plate and a floor, along which it slides or at which it
+/// sticks. Nothing else acts on it, so that both together take what it loses.
 #[test]
 fn obstacles_take_the_momentum_that_the_fluid_loses() {
     for (method, fluid, walls) in [
@@ -412,14 +412,15 @@ scene hit {{
         println!("{method} {walls}: taken {taken:?}, lost {lost}");
         assert!(lost.length() > 5.0, "{method}: {lost}");
         assert!(taken[0].x < -5.0 && taken[1].z < -1.0, "{taken:?}");
-        // wcsph changes velocities by the mean of the forces at both ends of a step, and the force is told at its end
+        // wcsph changes velocities by the mean of the forces at both ends of a step, and the force is
+        // reported at its end
         let off = (taken[0] + taken[1] - lost).length() / lost.length();
         assert!(off < 0.01, "{method} {walls}: {taken:?} {lost}");
     }
 }
 
-/// A jet that spreads on a plate, the lift of a body under water, a gate and a bottom that meet the walls of the box: means of
-/// forces, as the scenes state them.
+/// A jet that spreads on a plate, the lift of a body under water, a gate and a bottom that meet the walls of
+/// the box: means of forces, as the scenes state them.
 #[test]
 fn forces_on_bodies_are_those_of_momentum_and_of_archimedes() {
     for (name, scene, params, within) in [

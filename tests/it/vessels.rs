@@ -16,8 +16,9 @@ fn middle(simulation: &Simulation) -> DVec3 {
     places.iter().sum::<DVec3>() / places.iter().count() as f64
 }
 
-/// Water 0.4 m deep in a vessel of ten spacings by ten that is turned in its box, so that its edges lie along no wall of the box.
-/// Its middle lies at half of its depth. (Edges that counted as planes lifted it by 4 and 6 mm.)
+/// Water 0.4 m deep in a vessel of ten spacings by ten that is turned in its box, so that its edges lie along
+/// no wall of the box. Its middle lies at half of its depth. (Edges that counted as planes lifted it by 4 and
+/// 6 mm.)
 #[test]
 fn water_in_a_turned_vessel_stands_as_high_as_its_volume() {
     for (method, most) in [("wcsph", 0.0025), ("dfsph", 0.0035)] {
@@ -40,8 +41,8 @@ scene still {{
     }
 }
 
-/// A box that is full to its walls, at rest under its weight and in a slow vortex. (It burst within a second, and in fifteen
-/// steps.)
+/// A box that is full to its walls, at rest under its weight and in a slow vortex. (It burst within a second,
+/// and in fifteen steps.)
 #[test]
 fn a_full_box_neither_bursts_at_rest_nor_in_a_vortex() {
     let vortex = "velocity: [0.1*sin(pi*x/0.4)*cos(pi*y/0.4), -0.1*cos(pi*x/0.4)*sin(pi*y/0.4), 0]";
@@ -64,8 +65,8 @@ scene full {{
     }
 }
 
-/// The middle of a drop in a trap whose pull grows with the distance swings as x₀·cos(ωt), whatever else the fluid does.
-/// Steps are longer where it turns. (It lost 7 % of its way in three periods with dfsph.)
+/// The middle of a drop in a trap whose pull grows with the distance swings as x₀·cos(ωt), whatever else the
+/// fluid does. Steps are longer where it turns. (It lost 7 % of its way in three periods with dfsph.)
 #[test]
 fn a_drop_swings_in_a_trap_without_loss() {
     for method in ["wcsph", "dfsph"] {
@@ -94,9 +95,9 @@ scene trap {{
     }
 }
 
-/// Water under a gravity that grows from next to nothing, and a drop that hardly moves but for its surface tension: the speed of
-/// sound of wcsph follows from what comes, and not from the start. (The first was crushed to three quarters of its
-/// height, the second by a third.)
+/// Water under a gravity that grows from next to nothing, and a drop that hardly moves but for its surface
+/// tension: the speed of sound of wcsph follows from what comes, and not from the start. (The first was
+/// crushed to three quarters of its height, the second by a third.)
 #[test]
 fn sound_is_fast_enough_for_what_comes() {
     let growing = "
@@ -137,8 +138,8 @@ scene crushed {
     assert!(told.contains(&rfm::sph::Finding::Compression), "{told:?}");
 }
 
-/// A cup half a spacing above the floor, under water: nothing fits below it, beside its hollow as little as elsewhere. (Four particles
-/// stayed there, and fell in place without end.)
+/// A cup half a spacing above the floor, under water: nothing fits below it, beside its hollow as little as
+/// elsewhere. (Four particles stayed there, and fell in place without end.)
 #[test]
 fn no_particle_lies_below_a_cup_that_leaves_no_room() {
     let mut simulation = simulation(

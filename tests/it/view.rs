@@ -1,5 +1,5 @@
-//! `rfm view`: what a saved page holds, and how the server treats browsers, other pages and nonsense. What the page does
-//! with it is tested in a browser, by `tests/viewer`.
+//! `rfm view`: what a saved page holds, and how the server treats browsers, other pages and nonsense. What
+//! the page does with it is tested in a browser, by `tests/viewer`.
 
 use std::io::{BufRead, BufReader, Read, Write};
 use std::net::{SocketAddr, TcpStream};
@@ -196,7 +196,7 @@ fn what_is_only_moved_has_one_mesh_and_surfaces_of_the_fluid_are_shown() {
     let none = [None; 3];
     assert_eq!(surfaces, [&none[..], &[Some(0), Some(1), Some(2)], &[None; 5]].concat());
     assert_eq!(of(&with, "surface").len(), 3);
-    // those of another run are not shown, and it is said
+    // those of another run are not shown, and a message says so
     let more =
         std::fs::read_to_string(here.join("drop.rfm")).unwrap().replace("particles: 800", "particles: 900");
     std::fs::write(here.join("other.rfm"), more).unwrap();
@@ -431,7 +431,7 @@ fn a_page_follows_the_run_and_commands_it() {
     ] {
         let mut other = viewer.own_page();
         other.send(Message::text(command)).unwrap();
-        // what is no command ends the connection, perhaps before the state is told
+        // what is no command ends the connection, perhaps before the state is sent
         let is_told =
             |message: Message| matches!(message, Message::Text(text) if text.contains("\"status\""));
         while other.read().is_ok_and(|message| !message.is_close() && !is_told(message)) {

@@ -53,8 +53,9 @@ scene work {
   run { until: 3 s }
 }";
 
-/// A piston that pushes half a metre of water together and rests again: the water keeps what it was given, less a little
-/// artificial viscosity. The sum of force times way has the error of the steps and of forces in corners.
+/// A piston that pushes half a metre of water together and rests again: the water keeps what it was given,
+/// less a little artificial viscosity. The sum of force times way has the error of the steps and of forces in
+/// corners.
 #[test]
 fn a_piston_gives_what_the_water_has_then() {
     for method in ["wcsph", "dfsph"] {
@@ -72,7 +73,8 @@ fn a_piston_gives_what_the_water_has_then() {
     }
 }
 
-/// The same if probes ask for the force on it, which is found in every step, for a piston in a corner as well.
+/// Probes of the force on a piston, which is found in every step, change nothing; nor do they for a piston in
+/// a corner.
 #[test]
 fn work_does_not_depend_on_whether_forces_are_asked_for() {
     for method in ["wcsph", "dfsph"] {
@@ -92,7 +94,8 @@ fn work_does_not_depend_on_whether_forces_are_asked_for() {
     }
 }
 
-/// Water that has dissipated most of what a stirrer gave, and then gains speed from nowhere, less than it has lost before.
+/// Water that has dissipated most of what a stirrer gave, and then gains speed from nowhere, less than it has
+/// lost before.
 #[test]
 fn energy_from_nowhere_is_found_beside_a_stirrer() {
     let experiment = experiment(
@@ -131,8 +134,8 @@ scene work {
     assert!(matches!(simulation.findings()[..], [(Finding::Energy, _)]), "{:?}", simulation.findings());
 }
 
-/// A drum that turns in a fluid which sticks to it: at last its power is what the closed form says, 4πµLΩ²·a²b²/(b² − a²). With
-/// five spacings across the gap the friction is off by some per cent.
+/// A drum that turns in a fluid which sticks to it: at last its power is what the closed form says,
+/// 4πµLΩ²·a²b²/(b² − a²). With five spacings across the gap the friction is off by some per cent.
 #[test]
 fn a_drum_works_by_friction() {
     let mut simulation = start(

@@ -193,9 +193,9 @@ fn stays_free(text: &str) {
     });
 }
 
-/// A particle in the slot between two gates of one solid, of which one lifts, in front of a dam. What is around it changes
-/// steadily: it comes back as slowly as it came. (By the faces of the gates, of which the nearest count, it met a jump in their
-/// middle and left with 11 m/s.)
+/// A particle in the slot between two gates of one solid, of which one lifts, in front of a dam. What is
+/// around it changes steadily: it comes back as slowly as it came. (By the faces of the gates, of which the
+/// nearest count, it met a jump in their middle and left with 11 m/s.)
 #[test]
 fn gates_that_lift_one_after_another_throw_nothing() {
     let text = "rfm 1

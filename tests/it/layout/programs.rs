@@ -1,4 +1,5 @@
-//! Random programs: files that the grammar accepts and that mean something, written by someone who does not care for layout.
+//! Random programs: files that the grammar accepts and that mean something, written by someone who does not
+//! care for layout.
 
 use rand_pcg::Pcg64;
 use rand_pcg::rand_core::{Rng, SeedableRng};
@@ -204,7 +205,8 @@ impl Writer {
         self.tokens.retain(|token| !token.is_empty());
     }
 
-    /// The tokens with random blanks between them. Nothing stands between an index and its list, or a number and its unit.
+    /// The tokens with random blanks between them. Nothing stands between an index and its list, or a number
+    /// and its unit.
     fn text(mut self) -> String {
         let mut text = String::from("rfm 1\n");
         let tokens = std::mem::take(&mut self.tokens);

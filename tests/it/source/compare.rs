@@ -194,7 +194,8 @@ fn compare_in<T: Columns>(
     check("sign", &found, &sign, &omega);
 
     call(function("distance"), at, extra, [&mut found]);
-    // where the formula tells nothing of the distance, the library searches for the surface, and sources do not
+    // where the formula says nothing about the distance, the library searches for the surface, and sources do
+    // not
     let told: Vec<usize> = (0..n).filter(|&i| found[i].wide() != 0.0 && !found[i].wide().is_nan()).collect();
     let pick = |column: &[T]| told.iter().map(|&i| column[i]).collect::<Vec<T>>();
     let places = at.map(pick);

@@ -81,8 +81,8 @@ fn short_examples() -> Vec<Solid> {
     solids
 }
 
-/// A fold written by hand, in two forms: in `f32` its first operations are stable and the later ones scaled. (A long fold is
-/// no better: gcc takes 16 s for 90 steps, and clang 14 half a minute for 25.)
+/// A fold written by hand, in two forms: in `f32` its first operations are stable and the later ones scaled.
+/// (A long fold is no better: gcc takes 16 s for 90 steps, and clang 14 half a minute for 25.)
 fn wide_fold() -> String {
     let step = |i: usize| format!("let u{i} = u{} or 1e15*{i}*x - y\n", i - 1);
     format!("rfm 1\nlet u0 = 1e15*x - z\n{}solid fold = u19\n", (1..20).map(step).collect::<String>())

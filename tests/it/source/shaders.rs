@@ -35,7 +35,8 @@ fn validate_glsl(text: &str) {
     validate(&module.unwrap_or_else(|e| panic!("{}\n{whole}", e.emit_to_string(&whole))), &whole);
 }
 
-/// Lines of the longest shader that is read in every run of the tests: the time that naga takes grows with their square.
+/// Lines of the longest shader that is read in every run of the tests: the time that naga takes grows with
+/// their square.
 const LONGEST_SHADER: usize = 500;
 
 /// Solids whose numbers `f32` can hold.
@@ -93,7 +94,7 @@ fn numbers_that_shaders_cannot_hold_are_refused() {
     }
 }
 
-/// As much of GLSL as the functions use, in C++.
+/// The part of GLSL that the functions use, in C++.
 const GLSL_IN_CPLUSPLUS: &str = "#include <cmath>\n#include <cstdio>\n#include <cstring>\n\
 struct vec3 { float x, y, z; };\n\
 struct vec4 { float x, y, z, w; vec4(float a, float b, float c, float d) : x(a), y(b), z(c), w(d) {} };\n\
@@ -103,7 +104,8 @@ using std::cosh; using std::log2; using std::sinh; using std::tanh;\n\
 static float roundEven(float x) { return std::nearbyint(x); }\n\
 static float atan(float y, float x) { return std::atan2(y, x); }\n";
 
-/// A program that reads points and writes ω, the sign and the gradient there, of the solid whose number is its argument.
+/// A program that reads points and writes ω, the sign and the gradient there, of the solid whose number is
+/// its argument.
 fn all_in_cplusplus(solids: &[Solid]) -> String {
     let mut text = GLSL_IN_CPLUSPLUS.to_string() + "#include <cstdlib>\n";
     let mut calls = String::new();

@@ -1,4 +1,4 @@
-//! The measured questions: each group asks one question about one obstacle of all who can answer it.
+//! The measured questions: each group asks all libraries that can answer it one question about one obstacle.
 
 use fidget::jit::JitShape;
 use rfm::codegen::Form;
@@ -17,7 +17,7 @@ const HAND_F32: &str = "hand textbook 128-bit f32";
 const HAND_F64: &str = "hand textbook 128-bit f64";
 const RAW: &str = "Fidget raw f32";
 
-/// Distance within which contact is asked for: a centimetre, just like in the notes on distance errors.
+/// Distance within which contact is looked for: a centimetre, as in the notes on distance errors.
 const REACH: f64 = 0.01;
 
 pub const MAP_SIGN: &str = "ours sign by cell map f64";

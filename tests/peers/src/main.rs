@@ -21,7 +21,7 @@ use std::process::ExitCode;
 use bars::Found;
 use groups::Obstacle;
 
-/// Number of primitives above which gradients are left out: nobody asks for them there, and compiling takes
+/// Number of primitives above which gradients are left out: they are not needed there, and compiling takes
 /// long.
 const GRADIENTS_UP_TO: usize = 500;
 

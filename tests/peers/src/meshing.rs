@@ -1,8 +1,8 @@
 //! Comparison of meshers, each on one thread, in turns: their time, and how far the mesh is from the surface.
 //!
 //! All work in one box that is a little larger than [0, 3]³, so that no face of an obstacle lies in a plane
-//! of the grid. `rfm::mesh::Reference` measures the meshes without knowing who made them. Volumes are
-//! compared with quadrature of the profiles if that is known.
+//! of the grid. `rfm::mesh::Reference` measures the meshes without knowing which program made them. Volumes
+//! are compared with quadrature of the profiles if that is known.
 
 use std::time::{Duration, Instant};
 
@@ -35,7 +35,7 @@ const SIDE: f64 = 3.12;
 const PATIENCE: Duration = Duration::from_secs(4);
 const TURNS: usize = 15;
 
-/// An obstacle in everybody's notation.
+/// An obstacle in the notation of every library.
 struct Scene {
     name: &'static str,
     text: String,

@@ -13,7 +13,7 @@ use crate::hand;
 use crate::measure::{BATCH, Points, Work};
 use crate::scenes::SIDE;
 
-/// Precision that everybody supports.
+/// Precision that every library supports.
 pub trait Precision: Lane + hand::Precision + Into<f64> {
     const NAME: &'static str;
     fn columns(points: &Points) -> [&[Self]; 3];

@@ -1,4 +1,4 @@
-//! Obstacles that everybody evaluates, written for rfm; `fidget.rs` has them in Fidget's notation.
+//! Obstacles that every library evaluates, written for rfm; `fidget.rs` has them in Fidget's notation.
 
 use std::fmt::Write;
 

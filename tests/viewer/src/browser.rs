@@ -40,7 +40,7 @@ pub fn installed() -> Option<PathBuf> {
 }
 
 impl Browser {
-    /// Starts a browser whose page has so many pixels.
+    /// Starts a browser whose page has the given size in pixels.
     pub fn start(program: &Path, (width, height): (u32, u32)) -> Self {
         let profile = tempfile::tempdir().unwrap();
         let mut child = Command::new(program)

@@ -15,7 +15,8 @@ use crate::shaders;
 
 const SIZE: (u32, u32) = (1100, 700);
 
-/// The height in metres of what `rfm render` leaves to the scene, for a cube of 3 m from the direction (0.6, −0.64, 0.48).
+/// The height in metres of what `rfm render` leaves to the scene, for a cube of 3 m from the direction (0.6,
+/// −0.64, 0.48).
 const RENDERED_HEIGHT: f64 = 4.692_309_429_472;
 
 /// What the cases share.
@@ -325,7 +326,7 @@ fn plots(room: &mut Room) {
     let last = room.browser.number("viewer.plots.plots[0].times.at(-1)");
     room.browser.wait_for(&format!("viewer.plots.plots[0].times.at(-1) > {last} + 0.02"));
     room.browser.click("#play");
-    // the last sample is told when the run pauses
+    // the last sample is sent when the run pauses
     room.browser.wait_for("!viewer.run.playing && viewer.plots.plots[0].times.at(-1) === Number(viewer.timeline.frames.at(-1).time.toPrecision(6))");
     room.shot("plots-live");
     assert_plots_fit(room);

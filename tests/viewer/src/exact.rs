@@ -122,7 +122,8 @@ pub fn in_motion(room: &mut Room) {
 }
 
 pub fn thin(room: &mut Room) {
-    // a plate of a tenth of a millimetre, a wire, and thick ones with the same outline; a param that decides how it is built
+    // a plate of a tenth of a millimetre, a wire, and thick ones with the same outline; a param that decides
+    // how it is built
     let scene = |thick: f64, wire: f64| {
         format!(
             "rfm 1\nparam n = 3 in 1 .. 6\nparam lean = 0.3 in 0 .. 1\nlet turned = [lean, 0, 0]\n\
@@ -229,7 +230,8 @@ pub fn ranges(room: &mut Room) {
             told.as_str().unwrap().split(',').map(|count| count.parse().unwrap()).collect();
         let [wrong, outside, skipped] = counts[..] else { panic!("{told}") };
         println!("  {name}: {wrong} wrong, {skipped} of {outside} boxes outside are known to be");
-        // small boxes are told apart, so rays need not stop everywhere; of the weights in a slope only the bounds are known
+        // small boxes are distinguished, so rays need not stop everywhere; only the bounds of the weights in
+        // a slope are known
         if wrong > 0 || (2 * skipped < outside && *name != "slope") {
             failures.push(format!("{name}: {wrong} wrong, {skipped} of {outside}"));
         }

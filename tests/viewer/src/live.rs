@@ -23,7 +23,7 @@ pub fn live(room: &mut Room) {
     room.browser.wait_for("viewer.timeline.frames.length === 1 && viewer.timeline.frames[0].step === 0");
     room.browser.click("#play");
     room.browser.wait_for("viewer.timeline.frames.length > 3");
-    // a second page sees the same run, and one that goes away disturbs nobody
+    // a second page sees the same run, and one that goes away does not disturb the first
     room.browser.open("about:blank");
     room.browser.open(&viewer.address);
     room.browser.wait_for("window.viewer && viewer.timeline.frames.length > 3");
@@ -134,7 +134,8 @@ pub fn solid(room: &mut Room) {
 pub fn moving_solid(room: &mut Room) {
     let viewer = Viewer::start(&room.folder, &["paddle.rfm", "-s", "stirrer"]);
     room.browser.open(&viewer.address);
-    // it moves by itself, and keeps a mesh of each instant as far as there is time for it: blades turn about a shaft at rest
+    // it moves by itself, and keeps a mesh of each instant as far as there is time for it: blades turn about
+    // a shaft at rest
     room.browser.wait_for("window.viewer && viewer.run.playing && viewer.timeline.frames.length > 10");
     assert_eq!(room.browser.eval("document.getElementById('transport').hidden"), false);
     assert_eq!(room.browser.number("viewer.setting.arrays.length"), 0.0);
@@ -167,7 +168,8 @@ pub fn moving_solid(room: &mut Room) {
     std::fs::write(&file, pellet).unwrap();
     let viewer = Viewer::start(&room.folder, &["pellet.rfm"]);
     room.browser.open(&viewer.address);
-    // words and frames come apart; its way ends at the greatest 1024/2^k s in which it takes up no more than twelve diameters
+    // words and frames come apart; its way ends at the greatest 1024/2^k s in which it takes up no more than
+    // twelve diameters
     let at_end = "!viewer.run.playing && document.getElementById('state').textContent === 'paused at the end of its way' \
                   && viewer.timeline.frames.at(-1)?.time === 0.03125";
     room.browser.wait_for(&format!("window.viewer && {at_end}"));
@@ -212,7 +214,7 @@ pub fn carried(room: &mut Room) {
     assert_eq!(room.browser.eval("viewer.setting.solids.join()"), "hub,vane");
     room.browser.choose("#solid", "vane");
     room.browser.wait_for("viewer.setting.solids.join() === 'vane,hub' && viewer.carried");
-    // a file that is gone is told of, and read when it is back
+    // a file that is gone is reported, and read when it is back
     std::fs::remove_file(&file).unwrap();
     room.browser.wait_for("document.getElementById('notice').textContent.includes('not there any more')");
     std::fs::write(&file, vane).unwrap();

@@ -1,5 +1,5 @@
-//! The viewer in a real browser: saved pages, live ones, what a person does with them. Pictures are left in a folder and
-//! compared with those in `pictures/`.
+//! The viewer in a real browser: saved pages, live ones, what a person does with them. Pictures are left in a
+//! folder and compared with those in `pictures/`.
 //!
 //! `cargo run` runs all cases; names as arguments choose some. Without a browser it says so and ends with 77.
 

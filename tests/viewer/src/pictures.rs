@@ -2,8 +2,8 @@
 
 use std::path::{Path, PathBuf};
 
-/// The largest mean difference of a channel from a kept picture, of 255. The same browser gives 0; without the obstacle the
-/// picture of the pawn differs by 1.
+/// The largest mean difference of a channel from a kept picture, of 255. The same browser gives 0; without
+/// the obstacle the picture of the pawn differs by 1.
 const TOLERANCE: f64 = 0.5;
 
 /// A picture: width, height and the bytes of red, green and blue.

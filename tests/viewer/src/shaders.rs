@@ -52,7 +52,8 @@ pub const FORMULAS: &[(&str, &str)] = &[
     ("repeat", "sphere(0.2).repeat([0.7, 0.7, 0.7], [3, 3, 3])"),
 ];
 
-/// Shapes with round edges. Shaders that compute their ranges as well are too long for a browser without a graphics processor.
+/// Shapes with round edges. Shaders that compute their ranges as well are too long for a browser without a
+/// graphics processor.
 const ROUNDED: &[(&str, &str)] = &[
     (
         "rounded",
