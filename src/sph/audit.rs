@@ -1,13 +1,14 @@
 //! The audit of a simulation: what its energy, its volume and its densities say about whether it can be
 //! believed. It runs in every simulation and changes nothing in it.
 //!
-//! Energy is compared with the work of gravity and of walls after every step: E = ½Σmv² + Σm·e(ρ) − W. The work of
-//! uniform gravity is M·g·Δ(centre of mass), and that of a field of gravity is the integral of its power. Where a method's
-//! velocities are those of the middle of a step, only half of what the field does in it is set against them. The work of walls
-//! which move is the sum of force times way over what they do to particles in pressure, friction and contacts. Viscosity,
-//! contacts with walls at rest and diffusion only take from E, so all that it gains is an error of the method. Where walls work
-//! on the fluid, what they give is soon dissipated, and would hide any gain: there E is compared with the least that it has been.
-//! The energy that a surface under tension has at the start may become motion, so it is allowed for.
+//! Energy is compared with the work of gravity and of walls after every step: E = ½Σmv² + Σm·e(ρ) − W. The
+//! work of uniform gravity is M·g·Δ(centre of mass), and that of a field of gravity is the integral of its
+//! power. Where a method's velocities are those of the middle of a step, only half of what the field does in
+//! it is set against them. The work of walls which move is the sum of force times way over what they do to
+//! particles in pressure, friction and contacts. Viscosity, contacts with walls at rest and diffusion only
+//! take from E, so all that it gains is an error of the method. Where walls work on the fluid, what they give
+//! is soon dissipated, and would hide any gain: there E is compared with the least that it has been. The
+//! energy that a surface under tension has at the start may become motion, so it is allowed for.
 //!
 //! Densities are those that the particles' places say, Σ m·W and the part of the walls, and not those that a
 //! method carries along. A density below that at rest belongs to the surface and counts as that at rest.
@@ -28,38 +29,38 @@ use super::params::Parameters;
 /// The least energy at the start that is judged, in units of Σm·(expected speed)².
 const LEAST_ENERGY: f64 = 1e-9;
 
-/// The least energy with which what walls give is compared, in units of Σm·(expected speed)²: that of a thirtieth of this
-/// speed. A fluid that they set in motion begins with none.
+/// The least energy with which what walls give is compared, in units of Σm·(expected speed)²: that of a
+/// thirtieth of this speed. A fluid that they set in motion begins with none.
 const LEAST_GIVEN: f64 = 5e-4;
 
-/// Why the energy is not judged any more after a wall had no finite velocity.
+/// Why the energy is no longer judged after a wall had no finite velocity.
 pub const UNDEFINED_WORK: &str = "the velocity of a moving wall has no finite value";
 
 /// Number of steps from one look at the densities to the next.
 const LOOK: u64 = 8;
 
-/// Greatest excess of energy, as a part of the reference, that is no finding.
+/// An excess of energy above this part of the reference is a finding.
 const MOST_EXCESS: f64 = 0.01;
 
-/// Greatest excess of energy that is no finding, as a part of the greatest energy of motion: of a low wave in deep
-/// water nearly all energy is that of the depth, which cannot move.
+/// An excess of energy above this part of the greatest energy of motion is a finding too: nearly all energy
+/// of a low wave in deep water is that of the depth, which cannot move.
 const MOST_OF_MOTION: f64 = 0.25;
 
-/// The least excess, as a part of the reference, that is a finding by this measure: water that comes to rest moves
-/// next to nothing.
+/// By this measure, only an excess above this part of the reference is a finding: water that comes to rest
+/// hardly moves.
 const LEAST_EXCESS: f64 = 0.002;
 
-/// The energy of motion, as a part of the reference, below which waves are not said to have grown. Water at rest has less, and
-/// what it gains as its particles leave their lattice has nothing to do with motion.
+/// The energy of motion, as a part of the reference, below which waves are not said to have grown. Water at
+/// rest has less, and what it gains as its particles leave their lattice has nothing to do with motion.
 const LEAST_MOTION: f64 = 1e-3;
 
 /// An excess of energy, as a part of the reference, that ends a run.
 const RUINOUS_EXCESS: f64 = 1.0;
 
-/// Greatest change of the volume, as a part of it, that is no finding.
+/// A change of the volume above this part of it is a finding.
 const MOST_VOLUME_CHANGE: f64 = 0.02;
 
-/// Greatest mean compression that is no finding, in units of what the method is to keep.
+/// A mean compression above this is a finding, in units of the one that the method is to keep.
 const MOST_COMPRESSION: f64 = 10.0;
 
 /// Why the energy is not judged where obstacles or their surfaces move, of methods that do not note what walls do.
@@ -104,7 +105,7 @@ pub struct Audit {
     max_speed: f64,
     /// The figures of the last look.
     now: Instant,
-    /// Which findings have been told, in the order of [`Finding::ALL`].
+    /// Which findings have been reported, in the order of [`Finding::ALL`].
     told: [bool; 3],
 }
 
@@ -138,7 +139,8 @@ struct Sums {
     squares: f64,
     places: DVec3,
     elastic: f64,
-    /// Power of a field of gravity at the present places, and where particles with their velocities were a step ago, W/kg.
+    /// Power of a field of gravity at the present places, and where particles with their velocities were a
+    /// step ago, W/kg.
     power: f64,
     power_before: f64,
     /// Sum of what the field pulls with, m/s².
@@ -240,8 +242,8 @@ impl Audit {
         }
     }
 
-    /// Takes the figures of the state after a step of the length `dt`, s, in which walls did this work, J. `densities` are
-    /// those that the particles' places say, kg/m³.
+    /// Takes the figures of the state after a step of the length `dt`, s, in which walls did this work, J.
+    /// `densities` are those that the particles' places say, kg/m³.
     ///
     /// # Errors
     /// [`StepError::EnergyDoubled`] if the energy has doubled without work.
@@ -306,8 +308,8 @@ impl Audit {
         Ok(())
     }
 
-    /// Judges the mean gain of the last steps where walls move. Their work is found for several steps at a time, and its
-    /// errors add up over a long run: they are no reason to end it.
+    /// Judges the mean gain of the last steps where walls move. Their work is found for several steps at a
+    /// time, and its errors add up over a long run: they are no reason to end it.
     fn look_at_gain(&mut self, surface_tension: f64) {
         let gained = std::mem::take(&mut self.gained);
         // of a surface under tension only what it has at the start is known, so it may have been the least
@@ -316,8 +318,9 @@ impl Audit {
         (self.now.excess, self.excess) = (excess, self.excess.max(excess));
     }
 
-    /// The greatest excess of the energy over that at the start and the work of gravity and walls, as a part of the greatest
-    /// energy so far; where walls work on the fluid, over the least that it has been. `None` if it is not judged, see [`Audit::unjudged`].
+    /// The greatest excess of the energy over that at the start and the work of gravity and walls, as a part
+    /// of the greatest energy so far; where walls work on the fluid, over the least that it has been. `None`
+    /// if it is not judged, see [`Audit::unjudged`].
     pub fn energy_excess(&self) -> Option<f64> {
         self.unjudged.is_none().then_some(self.excess)
     }
@@ -415,7 +418,7 @@ impl Audit {
             .collect()
     }
 
-    /// The findings that were not told before; they count as told from now on.
+    /// Returns the findings that were not reported before, and marks them as reported.
     pub fn news(&mut self, kept: Option<f64>) -> Vec<(Finding, String)> {
         let found = self.findings(kept);
         found
@@ -456,8 +459,8 @@ impl Audit {
         numbers.into_iter().chain(now).chain(told).collect()
     }
 
-    /// Takes up the audit of a checkpoint. A memory of another length is ignored, but for those of versions that did
-    /// not have the greatest energy of motion.
+    /// Takes up the audit of a checkpoint. A memory of another length is ignored, except for the shorter one
+    /// of older versions, which did not have the greatest energy of motion.
     pub(super) fn take_up(&mut self, memory: &[f64]) {
         let mut memory = memory.to_vec();
         if memory.len() == 27 {
@@ -525,8 +528,8 @@ impl Audit {
     }
 }
 
-/// The energy of a fluid's height, J: that of its fall to the lowest corner of the box. A field of gravity has no lowest corner;
-/// a fall by the support radius is its scale.
+/// The energy of a fluid's height, J: that of its fall to the lowest corner of the box. A field of gravity
+/// has no lowest corner; a fall by the support radius is its scale.
 fn height(core: &Core, sums: &Sums) -> f64 {
     let Core { parameters, boundary, particles, .. } = core;
     let g = parameters.gravity;
