@@ -1,18 +1,19 @@
 //! The arguments of every command, with the help that teaches them.
 
-use std::num::NonZeroUsize;
 use std::path::PathBuf;
 
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 use clap::{Arg, Args, CommandFactory, Parser, Subcommand, ValueEnum};
+use clap_complete::Shell;
 
 use super::mesh::{ascii_help, format_name, output_help, unit_help, unit_name};
 use super::render::Surface;
+use super::shared::Shared;
 use super::sweep::options::{Again, SweepOptions};
 pub(super) use super::values::{CameraFlag, CutFlag};
 use super::values::{
-    Definition, Deny, Frames, Tolerance, aabb, camera, cut, definition, deny, frames, length, plane, point,
-    seconds, threads, tolerance, window,
+    Deny, Frames, Tolerance, aabb, camera, cut, deny, frames, length, plane, point, seconds, tolerance,
+    window,
 };
 use glam::DVec3;
 use rfm::geom::Aabb;
@@ -44,6 +45,9 @@ pub(super) struct Arguments {
 /// Commands that read no file of the language: options of all commands mean nothing to them.
 const WITHOUT_FILES: [&str; 4] = ["completions", "man", "lsp", "init"];
 
+/// Help without the options of all commands, for those that have no use for them.
+const HELP: &str = "{about-with-newline}\n{usage-heading} {usage}\n\nArguments:\n{positionals}{after-help}";
+
 /// The declaration of all commands. Options of all commands are hidden where they mean nothing.
 pub(super) fn declaration() -> clap::Command {
     let whole = Arguments::command();
@@ -55,51 +59,6 @@ pub(super) fn declaration() -> clap::Command {
         // a command's own declaration of an option replaces the one that it would get
         command.args(shared.iter().map(|arg| arg.clone().hide(true)))
     })
-}
-
-#[derive(Debug, Clone, Args)]
-pub(super) struct Shared {
-    /// Set a param of the file, with a unit or in SI units (-D d=8mm, -D alpha="10 deg"); may be repeated
-    #[arg(short = 'D', value_name = "NAME=VALUE", value_parser = definition, global = true)]
-    pub define: Vec<Definition>,
-    /// Set params from a TOML or JSON file: `d = "8 mm"`, `alpha = 0.5`; -D goes before it; may be repeated
-    #[arg(short = 'P', long, value_name = "FILE", global = true)]
-    pub params: Vec<PathBuf>,
-    /// Threads to use [default: all processors]; results do not depend on it
-    #[arg(long, value_name = "N", value_parser = threads, global = true)]
-    pub threads: Option<NonZeroUsize>,
-    /// Print one JSON document on standard output instead of text
-    #[arg(long, global = true)]
-    pub json: bool,
-    /// Let a file import and read files outside of its own folder
-    #[arg(long, global = true, hide_short_help = true)]
-    pub allow_outside: bool,
-    /// Operations that a file may unroll to [default: 1000000, or 4 for each byte of a longer file with its imports]
-    #[arg(long, value_name = "N", global = true, hide_short_help = true)]
-    pub max_nodes: Option<usize>,
-    /// What evaluates ω: machine code or the interpreter, which gives the same bits
-    #[arg(long, value_enum, default_value_t = Engine::Auto, global = true, hide_short_help = true)]
-    pub engine: Engine,
-}
-
-#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-pub(super) enum Engine {
-    /// Machine code where it can be made
-    Auto,
-    /// Machine code, or an error
-    Jit,
-    /// The interpreter
-    Interp,
-}
-
-impl From<Engine> for rfm::Engine {
-    fn from(engine: Engine) -> Self {
-        match engine {
-            Engine::Auto => Self::Auto,
-            Engine::Jit => Self::Jit,
-            Engine::Interp => Self::Interpreter,
-        }
-    }
 }
 
 #[derive(Debug, Subcommand)]
@@ -129,9 +88,9 @@ pub(super) enum Command {
     /// Write a file to begin with: an obstacle, an experiment or a validation
     Init(super::init::Init),
     /// Print what a shell needs to complete commands and options
-    Completions(super::manual::Completions),
+    Completions(Completions),
     /// Print the manual page, or write one for each command
-    Man(super::manual::Man),
+    Man(Man),
 }
 
 #[derive(Debug, Clone, Args)]
@@ -499,6 +458,25 @@ pub(super) enum Stage {
     Clif,
     /// Machine code
     Asm,
+}
+
+#[derive(Debug, Args)]
+#[command(help_template = HELP, override_usage = "rfm completions <SHELL>")]
+#[command(after_help = "bash:  rfm completions bash > ~/.local/share/bash-completion/completions/rfm\n\
+                        fish:  rfm completions fish > ~/.config/fish/completions/rfm.fish\n\
+                        zsh:   rfm completions zsh > a file _rfm in a folder of $fpath")]
+pub(super) struct Completions {
+    /// The shell
+    #[arg(value_enum)]
+    pub shell: Shell,
+}
+
+#[derive(Debug, Args)]
+#[command(help_template = HELP, override_usage = "rfm man [DIR]")]
+pub(super) struct Man {
+    /// Folder for a page of each command [default: rfm's own page, on standard output]
+    #[arg(value_name = "DIR")]
+    pub folder: Option<PathBuf>,
 }
 
 /// The help of `rfm build --output`: the languages and their endings.

@@ -5,8 +5,9 @@ use std::path::{Path, PathBuf};
 
 use serde::Serialize;
 
-use super::args::{Build as Options, BuildWhat, Shared};
+use super::args::{Build as Options, BuildWhat};
 use super::failure::{Failure, note};
+use super::shared::Shared;
 use super::{choose, input, output};
 use crate::cli::output::Shown;
 use rfm::codegen::CodegenError;

@@ -2,9 +2,9 @@
 
 use std::path::Path;
 
-use super::args::Shared;
 use super::failure::{Failure, note};
 use super::input;
+use super::shared::Shared;
 use crate::cli::output::Shown;
 use rfm::diagnostic::{Diagnostics, nearest};
 use rfm::lower::{NamedSolid, Scene};

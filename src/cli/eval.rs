@@ -9,9 +9,10 @@ use std::sync::OnceLock;
 use glam::DVec3;
 use rayon::prelude::*;
 
-use super::args::{Eval, Shared, What};
+use super::args::{Eval, What};
 use super::failure::Failure;
 use super::progress::{self, Progress};
+use super::shared::Shared;
 use super::{choose, input, output};
 use crate::cli::output::Shown;
 use rfm::field::Points;

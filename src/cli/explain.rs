@@ -4,9 +4,10 @@ use std::path::Path;
 
 use glam::DVec3;
 
-use super::args::{Explain, Shared, Stage};
+use super::args::{Explain, Stage};
 use super::language::{page, words::is_of_a_word};
 use super::run::{experiment, start};
+use super::shared::Shared;
 use super::{Failure, choose, input};
 use rfm::codegen::{CodegenError, Listing, Request, Shape, target_description};
 use rfm::diagnostic::{Span, explain, explanations, nearest};

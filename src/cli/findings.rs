@@ -6,8 +6,9 @@ use std::path::Path;
 use serde::Serialize;
 use serde_json::json;
 
-use super::args::{MessageFormat, Shared};
+use super::args::MessageFormat;
 use super::failure::{Failure, note};
+use super::shared::Shared;
 use super::values::Deny;
 use super::{input, output};
 use crate::cli::output::Shown;

@@ -8,8 +8,8 @@ use clap::Args;
 use serde::Serialize;
 use similar::TextDiff;
 
-use super::args::Shared;
 use super::failure::{Failure, complain};
+use super::shared::Shared;
 use super::{input, output};
 use crate::cli::output::Shown;
 use rfm::diagnostic::{Diagnostics, Source, printable};

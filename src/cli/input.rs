@@ -4,8 +4,8 @@
 use std::io::{IsTerminal, Read};
 use std::path::Path;
 
-use super::args::Shared;
 use super::failure::{Failure, note};
+use super::shared::Shared;
 use crate::cli::output::Shown;
 use rfm::Program;
 use rfm::compile::{files_beside, text_of};

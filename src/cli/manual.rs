@@ -1,36 +1,12 @@
 //! `rfm completions` and `rfm man`: what shells and `man` read about the commands, made from their declarations.
 
 use std::io::Write;
-use std::path::PathBuf;
 
-use clap::{Arg, ArgAction, Args, Command};
-use clap_complete::Shell;
+use clap::{Arg, ArgAction, Command};
 
-use super::args;
+use super::args::{self, Completions, Man};
 use super::failure::Failure;
 use super::output::{self, Shown};
-
-/// Help without the options of all commands.
-const HELP: &str = "{about-with-newline}\n{usage-heading} {usage}\n\nArguments:\n{positionals}{after-help}";
-
-#[derive(Debug, Args)]
-#[command(help_template = HELP, override_usage = "rfm completions <SHELL>")]
-#[command(after_help = "bash:  rfm completions bash > ~/.local/share/bash-completion/completions/rfm\n\
-                        fish:  rfm completions fish > ~/.config/fish/completions/rfm.fish\n\
-                        zsh:   rfm completions zsh > a file _rfm in a folder of $fpath")]
-pub(super) struct Completions {
-    /// The shell
-    #[arg(value_enum)]
-    pub shell: Shell,
-}
-
-#[derive(Debug, Args)]
-#[command(help_template = HELP, override_usage = "rfm man [DIR]")]
-pub(super) struct Man {
-    /// Folder for a page of each command [default: rfm's own page, on standard output]
-    #[arg(value_name = "DIR")]
-    pub folder: Option<PathBuf>,
-}
 
 /// Prints the completions of a shell.
 pub(super) fn completions(options: &Completions) -> Result<(), Failure> {

@@ -35,6 +35,7 @@ mod run;
 mod saved;
 mod scenery;
 mod section;
+mod shared;
 mod stopwatch;
 mod surfaces;
 mod survey;

@@ -5,11 +5,12 @@ use std::path::{Path, PathBuf};
 
 use glam::{DVec2, DVec3};
 
-use super::args::{Check, MessageFormat, Plotted, Shared};
+use super::args::{Check, MessageFormat, Plotted};
 use super::deadline::Deadline;
 use super::failure::{Failure, note};
 use super::mesh::{LEAST_SEARCH, hidden};
 use super::output::Shown;
+use super::shared::Shared;
 use super::{choose, output};
 use rfm::diagnostic::{Code, Diagnostic, Span};
 use rfm::field::Field;

@@ -3,7 +3,7 @@
 use std::collections::BTreeSet;
 
 use super::c_blocks::{self, Blocks};
-use super::language::{C, Function, pair};
+use super::language::{C, Function};
 use super::operations::{Names, Operation, WEIGHTED_FIELDS};
 use super::program::{Program, Question};
 use super::statements::{Part, Statements, Writer};
@@ -527,9 +527,4 @@ impl CFile<'_> {
         lines.extend(["    }", "}", "#endif"].map(String::from));
         lines
     }
-}
-
-/// The type of numbers, for texts of other parts of the C files.
-pub(super) fn number(precision: Precision) -> &'static str {
-    pair(C.types, precision)
 }

@@ -7,12 +7,12 @@
 use std::cell::RefCell;
 use std::collections::HashMap;
 
+use super::SourceError;
 use super::c_chunks::{Chunk, chunks};
 use super::language::C;
 use super::operations::{Operation, WEIGHTED_FIELDS};
 use super::program::{Program, Question};
 use super::statements::{Part, Statements, Writer};
-use super::{SourceError, c};
 use crate::ir::{Axis, Binary, Expr, Form, Forms, Graph, Node};
 use crate::precision::Precision;
 use crate::solid::{BlockPlan, BlockStep, ColumnPlace, JoiningOperation, Piece};
@@ -135,7 +135,7 @@ impl Blocks {
         }
         let Written { mut made, called, constants, table, .. } = written;
         let lines = &mut made.lines;
-        let number = c::number(self.precision);
+        let number = C.number(self.precision);
         if !constants.is_empty() {
             let constants: Vec<String> =
                 constants.iter().filter_map(|&value| C.constant(value, self.precision)).collect();
@@ -252,7 +252,7 @@ impl Blocks {
     ) {
         made.operations.extend(&body.operations);
         made.functions.extend(&body.functions);
-        let number = c::number(self.precision);
+        let number = C.number(self.precision);
         let mut arguments = vec!["size_t n".to_string()];
         arguments.extend(["x", "y", "z"].map(|axis| format!("const {number} *RFM_RESTRICT {axis}")));
         if self.has_uniforms {
@@ -284,7 +284,7 @@ impl Blocks {
         writer: &Writer<'_>,
         made: &mut Statements,
     ) -> Result<(), SourceError> {
-        let number = c::number(self.precision);
+        let number = C.number(self.precision);
         let column = |name: &str| format!("const {number} *RFM_RESTRICT {name}");
         let result = |name: &str| format!("{number} *RFM_RESTRICT {name}");
         let (arguments, body) = match action {
@@ -328,7 +328,7 @@ impl Blocks {
 
     /// The function that takes the steps for one block of points. Columns of the caller are −1, −2 …
     fn run(&self, name: &str, called: &[Called], lines: &mut Vec<String>) {
-        let number = c::number(self.precision);
+        let number = C.number(self.precision);
         let u = if self.has_uniforms { format!(", const {number} *u") } else { String::new() };
         lines.push(String::new());
         lines.push("/* n points, as many as a column of its own has room for: stride. */".into());

@@ -22,9 +22,10 @@ mod compression;
 
 pub use compression::Compression;
 
-use super::core::{CHUNK, Core};
+use super::core::Core;
 use super::error::StepError;
 use super::params::Parameters;
+use super::particles::CHUNK;
 
 /// The least energy at the start that is judged, in units of Σm·(expected speed)².
 const LEAST_ENERGY: f64 = 1e-9;

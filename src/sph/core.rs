@@ -16,14 +16,11 @@ use super::{
     error::{Cause, Quantity, StepError},
     pairs::{Cloud, Columns, Near, PairPass, Real},
     params::Parameters,
-    particles::{Particles, Vectors},
+    particles::{CHUNK, Particles, Vectors, add_scaled, set_sum},
     walls::{
         Behind, Boundary, Coverage, Fault, Friction, MARKED, StepLimits, Trouble, UNKNOWN, Undefined, Wall,
     },
 };
-
-/// Number of particles that one task of a parallel loop handles.
-pub(super) const CHUNK: usize = 2048;
 
 /// A step shorter than this part of the longest one so far makes a run useless: speeds have grown by a factor
 /// of 10⁶, or forces by 10¹².
@@ -469,39 +466,6 @@ fn permute<T: Copy + Default + Send + Sync>(order: &[u32], values: &mut Vec<T>, 
         }
     });
     std::mem::swap(values, buffer);
-}
-
-/// Sets `to` = a + b·t.
-pub(super) fn set_sum(to: &mut Vectors, a: &Vectors, b: &Vectors, t: f64) {
-    for (to, a, b) in [(&mut to.x, &a.x, &b.x), (&mut to.y, &a.y, &b.y), (&mut to.z, &a.z, &b.z)] {
-        set_sum_column(to, a, b, t);
-    }
-}
-
-/// Sets `to` = a + b·t.
-pub(super) fn set_sum_column(to: &mut Vec<f64>, a: &[f64], b: &[f64], t: f64) {
-    to.resize(a.len(), 0.0);
-    to.par_chunks_mut(CHUNK).zip(a.par_chunks(CHUNK)).zip(b.par_chunks(CHUNK)).for_each(|((to, a), b)| {
-        for ((to, a), b) in to.iter_mut().zip(a).zip(b) {
-            *to = a + b * t;
-        }
-    });
-}
-
-/// Adds from·t to `to`.
-pub(super) fn add_scaled(to: &mut Vectors, from: &Vectors, t: f64) {
-    for (to, from) in [(&mut to.x, &from.x), (&mut to.y, &from.y), (&mut to.z, &from.z)] {
-        add_scaled_column(to, from, t);
-    }
-}
-
-/// Adds from·t to `to`.
-pub(super) fn add_scaled_column(to: &mut [f64], from: &[f64], t: f64) {
-    to.par_chunks_mut(CHUNK).zip(from.par_chunks(CHUNK)).for_each(|(to, from)| {
-        for (to, from) in to.iter_mut().zip(from) {
-            *to += from * t;
-        }
-    });
 }
 
 /// Length of the longest vector.

@@ -3,8 +3,12 @@
 //! Invariant: all arrays have one length. The solver reorders particles as they move; `id` identifies them.
 
 use glam::DVec3;
+use rayon::prelude::*;
 
 use crate::field::Points;
+
+/// Number of particles that one task of a parallel loop handles.
+pub(super) const CHUNK: usize = 2048;
 
 /// Many vectors as three columns of one length.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -132,6 +136,39 @@ impl Particles {
         order.sort_unstable_by_key(|&i| self.id[i]);
         order
     }
+}
+
+/// Sets `to` = a + b·t.
+pub(super) fn set_sum(to: &mut Vectors, a: &Vectors, b: &Vectors, t: f64) {
+    for (to, a, b) in [(&mut to.x, &a.x, &b.x), (&mut to.y, &a.y, &b.y), (&mut to.z, &a.z, &b.z)] {
+        set_sum_column(to, a, b, t);
+    }
+}
+
+/// Sets `to` = a + b·t.
+pub(super) fn set_sum_column(to: &mut Vec<f64>, a: &[f64], b: &[f64], t: f64) {
+    to.resize(a.len(), 0.0);
+    to.par_chunks_mut(CHUNK).zip(a.par_chunks(CHUNK)).zip(b.par_chunks(CHUNK)).for_each(|((to, a), b)| {
+        for ((to, a), b) in to.iter_mut().zip(a).zip(b) {
+            *to = a + b * t;
+        }
+    });
+}
+
+/// Adds from·t to `to`.
+pub(super) fn add_scaled(to: &mut Vectors, from: &Vectors, t: f64) {
+    for (to, from) in [(&mut to.x, &from.x), (&mut to.y, &from.y), (&mut to.z, &from.z)] {
+        add_scaled_column(to, from, t);
+    }
+}
+
+/// Adds from·t to `to`.
+pub(super) fn add_scaled_column(to: &mut [f64], from: &[f64], t: f64) {
+    to.par_chunks_mut(CHUNK).zip(from.par_chunks(CHUNK)).for_each(|(to, from)| {
+        for (to, from) in to.iter_mut().zip(from) {
+            *to += from * t;
+        }
+    });
 }
 
 #[cfg(test)]

@@ -9,11 +9,12 @@ use std::time::{Duration, Instant, SystemTime};
 
 use serde::Serialize;
 
-use super::args::{Check, MessageFormat, Shared};
+use super::args::{Check, MessageFormat};
 use super::deadline::Deadline;
 use super::failure::{Failure, complain, note, warn};
 use super::findings::{self, Message, message};
 use super::mesh::hidden;
+use super::shared::Shared;
 use super::{choose, input, lints, output, section};
 use facts::{Box3, Facts, RESOLUTION, VOLUME_CELLS, print};
 use measure::measure;

@@ -9,9 +9,10 @@ use std::time::Instant;
 use glam::DVec3;
 use serde::Serialize;
 
-use super::super::args::{Mesh as Options, Shared};
+use super::super::args::Mesh as Options;
 use super::super::failure::{Failure, complain, note};
 use super::super::saved::{self, RunFigures};
+use super::super::shared::Shared;
 use super::super::surfaces::{self, Origins};
 use super::super::{output, progress};
 use super::format;

@@ -10,9 +10,10 @@ mod summary;
 use std::path::Path;
 use std::time::Instant;
 
-use super::args::{Mesh as Options, MeshMethod, Shared};
+use super::args::{Mesh as Options, MeshMethod};
 use super::deadline::Deadline;
 use super::failure::{Failure, complain, note};
+use super::shared::Shared;
 use super::{choose, input, output, progress};
 use crate::cli::output::Shown;
 pub(super) use format::{ascii_help, format_name, output_help, unit_help, unit_name};

@@ -19,8 +19,8 @@ mod options;
 mod scene;
 mod solid;
 
-use super::args::Shared;
 use super::failure::Failure;
+use super::shared::Shared;
 pub(super) use options::{Render, Surface};
 
 pub(super) fn run(shared: &Shared, options: &Render) -> Result<(), Failure> {

@@ -6,11 +6,11 @@ use rayon::prelude::*;
 
 use super::film::{Kind, Target};
 use super::options::Render;
-use crate::cli::args::Shared;
 use crate::cli::failure::Failure;
 use crate::cli::output::{Shown, counted};
 use crate::cli::run::bodies::Bodies;
 use crate::cli::scenery::{self, Drawn, half_towards_eye};
+use crate::cli::shared::Shared;
 use crate::cli::values::CutFlag;
 use crate::cli::{choose, input, output};
 use rfm::Solid;

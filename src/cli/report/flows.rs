@@ -10,9 +10,9 @@ use std::time::Instant;
 use anstream::println;
 use serde::Serialize;
 
-use super::super::args::Shared;
 use super::super::run::bodies::Bodies;
 use super::super::run::pictures::{Look, Pictures};
+use super::super::shared::Shared;
 use super::super::stopwatch::processor_seconds;
 use super::super::{Failure, choose, input, output, progress};
 use super::flow_plot;

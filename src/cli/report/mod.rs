@@ -20,8 +20,8 @@ mod table;
 use anstream::println;
 use serde::Serialize;
 
-use super::args::Shared;
 use super::failure::Failure;
+use super::shared::Shared;
 use super::{choose, input, output, progress};
 use crate::cli::output::Shown;
 use meshes::MeshFigures;

@@ -6,10 +6,11 @@ use std::path::Path;
 
 use serde::Serialize;
 
-use super::super::args::{Run, Shared};
+use super::super::args::Run;
 use super::super::failure::warn;
 use super::super::output::counted;
 use super::super::progress::duration;
+use super::super::shared::Shared;
 use super::super::stopwatch::Stopwatch;
 use super::super::{Failure, input, output};
 use super::frames::{self, FrameCost};

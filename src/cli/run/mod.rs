@@ -24,7 +24,8 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, OnceLock};
 use std::time::Instant;
 
-use super::args::{Run, Shared};
+use super::args::Run;
+use super::shared::Shared;
 use super::{Failure, choose, input, lints, note, output, progress};
 use crate::cli::output::Shown;
 use checkpoints::Checkpoints;

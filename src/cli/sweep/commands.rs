@@ -2,8 +2,9 @@
 
 use std::path::{Path, PathBuf};
 
-use super::super::args::{Check, Mesh, MessageFormat, Run, Shared};
+use super::super::args::{Check, Mesh, MessageFormat, Run};
 use super::super::report::Report;
+use super::super::shared::Shared;
 use super::super::{Failure, check as checks, choose, input, mesh as meshes, report as reports, run as runs};
 use super::figures::Command;
 use super::options::SweepOptions;

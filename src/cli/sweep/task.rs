@@ -3,9 +3,9 @@
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
-use super::super::args::Shared;
 use super::super::failure::{complain, note};
 use super::super::output::{self, Shown};
+use super::super::shared::Shared;
 use super::super::{Failure, input, run as runs};
 use super::figures::Command;
 use super::index::{Axis, INDEX, Index, Row};

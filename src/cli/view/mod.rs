@@ -33,8 +33,8 @@ mod way;
 use std::path::Path;
 use std::sync::Arc;
 
-use super::args::Shared;
 use super::failure::{Failure, note};
+use super::shared::Shared;
 use super::{input, output};
 use crate::cli::output::Shown;
 use board::Board;

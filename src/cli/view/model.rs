@@ -4,10 +4,10 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::time::SystemTime;
 
-use super::super::args::Shared;
 use super::super::choose;
 use super::super::input;
 use super::super::run::bodies::Bodies;
+use super::super::shared::Shared;
 use super::course::{Course, Flow, Motion, mesh_at};
 use super::messages::{message, plain, refused};
 use super::options::View;

@@ -11,8 +11,8 @@ use std::time::{Duration, Instant};
 
 use glam::DVec3;
 
-use super::super::args::Shared;
 use super::super::failure::Failure;
+use super::super::shared::Shared;
 use super::board::{Board, Status, Topic};
 use super::command::{Command, settled};
 use super::course::Course;

@@ -13,7 +13,7 @@ use super::super::{
     intersections::{Cubes, Neighbours, bounds_of, corners, crossing_pairs},
     normals,
 };
-use super::Care;
+use super::care::Care;
 use super::mend::{self, Aim};
 use super::patch::Patch;
 use super::refine::{self, Refined};

@@ -301,7 +301,7 @@ mod tests {
     use super::*;
     use crate::field::Closures;
     use crate::geom::Aabb;
-    use crate::mesh::dual::Care;
+    use crate::mesh::dual::care::Care;
 
     const BOUNDS: Aabb = Aabb { min: DVec3::splat(-9.0), max: DVec3::splat(9.0) };
 

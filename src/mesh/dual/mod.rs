@@ -22,6 +22,7 @@
 //! the same for any number of threads.
 
 mod bends;
+mod care;
 mod crease;
 mod draft;
 mod loops;
@@ -171,16 +172,6 @@ const MENDABLE: usize = 100;
 /// If fewer than one edge in this many triangles needs mending, mending takes less time than looking for
 /// crossings before it.
 const CHECKED: usize = 5000;
-
-/// What a mesh is made for. Few meshes cross themselves, and care against that costs sharpness and time, so it is
-/// taken only where a mesh without it does.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Care {
-    /// Vertices are as close to the surface as possible.
-    Sharp,
-    /// Without triangles that cross, though rims may become blunt and vertices leave the surface.
-    Apart,
-}
 
 /// Where the surface crosses the edges of the grid.
 struct Crossing {

@@ -8,7 +8,7 @@ use rustc_hash::FxHashMap;
 
 use super::super::intersections::{Cubes, Neighbours, Triangle, bounds_of, corners, cross, overlap};
 use super::super::normals::unit;
-use super::Care;
+use super::care::Care;
 use super::vertices::{Vertex, VertexKind, Vertices};
 use crate::field::Field;
 use crate::geom::Aabb;

@@ -2,7 +2,7 @@
 
 use rayon::prelude::*;
 
-use crate::sph::core::CHUNK;
+use crate::sph::particles::CHUNK;
 
 /// Width of a class of compressions, as a part of the rest density.
 pub(super) const CLASS: f64 = 5e-4;

@@ -20,9 +20,8 @@ use fearless_simd::{Simd, SimdFloat};
 
 use crate::sph::{
     checkpoint::{Checkpoint, CheckpointError},
-    core::set_sum,
     pairs::Real,
-    particles::Vectors,
+    particles::{Vectors, set_sum},
 };
 
 /// Velocities in parts: smooth ones, and what is left.

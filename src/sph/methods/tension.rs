@@ -21,10 +21,10 @@ use glam::DVec3;
 use super::crowding::Crowding;
 use super::free_bodies;
 use crate::sph::{
-    core::{Core, add_scaled},
+    core::Core,
     pairs::{PairPass, Real},
     params::Parameters,
-    particles::Vectors,
+    particles::{Vectors, add_scaled},
 };
 
 /// Limits of |n|·h: below the first a particle has no normal, from the second on it has one. A flat surface

@@ -68,11 +68,11 @@ use super::walls::Walls;
 use super::{ADVECTION, Dfsph, NOMINAL_SOUND};
 use crate::sph::{
     checkpoint::{Checkpoint, CheckpointError},
-    core::{Core, add_scaled},
+    core::Core,
     error::StepError,
     kernel::Wendland,
     params::Parameters,
-    particles::{Particles, Vectors},
+    particles::{Particles, Vectors, add_scaled},
     reaction::Reaction,
 };
 

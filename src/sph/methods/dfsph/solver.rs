@@ -7,9 +7,9 @@ use super::passes::{Constants, Continuation, Push, Squeeze};
 use super::rigid::Rigid;
 use super::walls::Walls;
 use crate::sph::{
-    core::{CHUNK, Core},
+    core::Core,
     params::Parameters,
-    particles::Vectors,
+    particles::{CHUNK, Vectors},
     reaction::Reaction,
     walls::Pushed,
 };

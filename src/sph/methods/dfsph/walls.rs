@@ -5,8 +5,8 @@ use rayon::prelude::*;
 
 use super::rigid::Rigid;
 use crate::sph::{
-    core::{CHUNK, Core},
-    particles::Vectors,
+    core::Core,
+    particles::{CHUNK, Vectors},
     walls::{Carried, Coverage, WallDrag},
 };
 

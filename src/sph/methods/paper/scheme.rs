@@ -19,12 +19,12 @@ use glam::DVec3;
 use super::super::scheme::Scheme;
 use super::Paper;
 use crate::sph::{
-    core::{Core, add_scaled, set_sum},
+    core::Core,
     error::StepError,
     kernel::Kernels,
     pairs::{PairPass, Real},
     params::Parameters,
-    particles::Vectors,
+    particles::{Vectors, add_scaled, set_sum},
 };
 
 /// The scheme. It keeps only working memory between steps.

@@ -64,9 +64,9 @@ use super::passes::{Differences, Missing, Pairs, Rates, closes_gaps};
 use super::{EXPONENT, Gradients, Wcsph};
 use crate::sph::{
     checkpoint::{Checkpoint, CheckpointError},
-    core::{CHUNK, Core, add_scaled, set_sum},
+    core::Core,
     error::StepError,
-    particles::Vectors,
+    particles::{CHUNK, Vectors, add_scaled, set_sum},
 };
 
 /// The scheme. It keeps the rates of change between steps; the rest is working memory.
