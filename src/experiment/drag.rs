@@ -6,7 +6,7 @@ use crate::diagnostic::{Code, Diagnostic};
 use crate::field::Moving;
 use crate::geom::{Aabb, Placement};
 use crate::lower::{AskedMean, Measured, Probe, Scene};
-use crate::sph::{Gradients, Method, Parameters};
+use crate::sph::Parameters;
 
 /// A body counts as at rest if it moves less than this part of the support radius while its mean force is
 /// taken: less than is seen of its surface. A body that comes to rest slowly never stops completely.
@@ -24,15 +24,10 @@ const INSTANTS: usize = 61;
 /// or lid, that wall bears a share of its own.) An obstacle in it would share that force, and the torque on a
 /// vessel that turns is what the fluid resists.
 pub(super) fn warnings(scene: &Scene, parameters: &Parameters, bodies: &[Body]) -> Vec<Diagnostic> {
-    if parameters.viscosity >= parameters.rest_density * parameters.numerical_viscosity() {
+    let is_thick = parameters.viscosity >= parameters.rest_density * parameters.numerical_viscosity();
+    if is_thick || !parameters.drag_is_too_large() {
         return Vec::new();
     }
-    let in_pairs = match scene.method {
-        Method::Wcsph(numbers) => numbers.gradients == Gradients::Pairs,
-        Method::Dfsph(_) => true,
-        // its fluid is as viscous as the paper's, and that causes more drag than the method does
-        Method::Paper(_) => false,
-    };
     let told = |probe: &Probe| {
         let (Measured::Force { body: number, .. }, Some(mean)) = (probe.measured, &probe.mean) else {
             return None;
@@ -54,7 +49,7 @@ pub(super) fn warnings(scene: &Scene, parameters: &Parameters, bodies: &[Body]) 
         let help = "write `gradients: differences` with `method: wcsph`";
         Some(Diagnostic::warning(Code::DRAG, probe.span, message).help(help))
     };
-    if in_pairs { scene.probes.iter().filter_map(told).collect() } else { Vec::new() }
+    scene.probes.iter().filter_map(told).collect()
 }
 
 /// The time over which a mean is taken, s.

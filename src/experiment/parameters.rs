@@ -7,7 +7,7 @@ use crate::Program;
 use crate::diagnostic::{Code, Diagnostic};
 use crate::ir::Node;
 use crate::lower::{Gravity, Scene};
-use crate::sph::{Method, Parameters, Slip};
+use crate::sph::{Parameters, Slip};
 
 /// The length of a simulation's steps, and where it comes from.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -126,8 +126,8 @@ pub(super) fn stirring(scene: &Scene, parameters: &Parameters) -> Option<Diagnos
 /// A warning if a stated speed of sound is so low that the fluid is compressed like a gas: its density
 /// changes by the square of the speed over that of sound.
 pub(super) fn slow_sound(scene: &Scene, parameters: &Parameters) -> Option<Diagnostic> {
-    let Method::Wcsph(numbers) = scene.method else { return None };
-    let (sound, speed) = (numbers.sound_speed?, numbers.driven_speed(&parameters.scales()));
+    let stated = parameters.stated_sound()?;
+    let (sound, speed) = (stated.sound_speed, stated.driven_speed);
     let rounded = |value: f64| format!("{value:.1e}").parse().unwrap_or(value);
     let change = 100.0 * (speed / sound).powi(2);
     (change > MUCH_COMPRESSED).then(|| {

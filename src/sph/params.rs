@@ -5,7 +5,7 @@ use glam::DVec3;
 
 use super::error::ParameterError;
 use super::kernel::Kernels;
-use super::methods::{COURANT, Method, Paper};
+use super::methods::{COURANT, Method, Paper, StatedSound};
 use super::scales::{Scales, Slip};
 use crate::precision::Precision;
 use crate::quantity::Bound;
@@ -202,6 +202,16 @@ impl Parameters {
     /// The kinematic viscosity, m²/s, with which a method damps the noise of particles, at least that of its defaults.
     pub fn numerical_viscosity(&self) -> f64 {
         self.method.numerics().numerical_viscosity(&self.scales())
+    }
+
+    /// Whether the method makes the drag of bodies that move through the fluid several times too large.
+    pub(crate) fn drag_is_too_large(&self) -> bool {
+        self.method.numerics().drag_is_too_large()
+    }
+
+    /// The speed of sound that a scene states, with the speed that it must exceed; `None` if the scene states none.
+    pub(crate) fn stated_sound(&self) -> Option<StatedSound> {
+        self.method.numerics().stated_sound(&self.scales())
     }
 
     /// The longest step, s, for an acceleration a, m/s²: a multiple of √(h/a), with the support radius h.

@@ -2,8 +2,23 @@
 //! readable `step` over the stages of [`Core`](super::core::Core).
 //!
 //! To add a method: a folder with its numbers, their declaration and limits (`mod.rs`) and its scheme
-//! (`scheme.rs`), a line in the list of this file, and an arm in `start.rs`. `rfm explain --methods` then
-//! writes the page beside it.
+//! (`scheme.rs`), and here a `mod` line and a line in the list of methods. `rfm explain --methods` then writes
+//! the page beside it.
+
+/// The list of all methods, in the order in which they are shown. It is handed to a macro.
+macro_rules! for_all_methods {
+    ($make:ident) => {
+        $make! {
+            /// Weakly compressible: density from the equation of continuity, pressure by Tait's equation.
+            Wcsph,
+            /// Divergence-free (Bender & Koschier 2017): the pressure is solved for, so that the density stays
+            /// constant.
+            Dfsph,
+            /// The method of the paper, equations 8–14, corrected.
+            Paper,
+        }
+    };
+}
 
 mod crowding;
 mod declaration;
@@ -30,7 +45,7 @@ pub use wcsph::{Gradients, Wcsph};
 
 use declaration::{Declaration, check, read};
 
-pub(super) use numerics::{COURANT, Numerics};
+pub(super) use numerics::{COURANT, Numerics, StatedSound};
 pub(super) use scheme::Scheme;
 pub(super) use start::start;
 
@@ -109,15 +124,7 @@ macro_rules! methods {
     };
 }
 
-methods! {
-    /// Weakly compressible: density from the equation of continuity, pressure by Tait's equation.
-    Wcsph,
-    /// Divergence-free (Bender & Koschier 2017): the pressure is solved for, so that the density stays
-    /// constant.
-    Dfsph,
-    /// The method of the paper, equations 8–14, corrected.
-    Paper,
-}
+for_all_methods!(methods);
 
 impl Method {
     /// The method with this name and default numbers; `None` if there is no such method.

@@ -16,11 +16,29 @@ pub(in crate::sph) const COURANT: f64 = 0.25;
 /// of h in such a step.
 const FORCE_FACTOR: f64 = 0.25;
 
+/// A speed of sound that is stated instead of derived.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct StatedSound {
+    /// The speed of sound, m/s.
+    pub sound_speed: f64,
+    /// The speed, m/s, to which the greatest pressure that is expected drives the fluid.
+    pub driven_speed: f64,
+}
+
 /// What the solver needs to know of a method's numbers.
 pub(in crate::sph) trait Numerics: Sync {
     /// The kinematic viscosity, m²/s, with which the noise of particles is damped, or would be by default: αhc/20 of an
     /// artificial viscosity. Rows of particles resist a shear about as much without it.
     fn numerical_viscosity(&self, scales: &Scales) -> f64;
+
+    /// Whether the drag of a body that moves through the fluid comes out several times too large, as it does with
+    /// pressures in pairs.
+    fn drag_is_too_large(&self) -> bool;
+
+    /// The speed of sound that a scene states, with the speed that it must exceed; `None` if the scene states none.
+    fn stated_sound(&self, _scales: &Scales) -> Option<StatedSound> {
+        None
+    }
 
     /// Checks what the bounds of single keys do not cover.
     ///

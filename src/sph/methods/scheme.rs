@@ -4,6 +4,13 @@ use crate::sph::checkpoint::{Checkpoint, CheckpointError};
 use crate::sph::core::Core;
 use crate::sph::error::StepError;
 
+/// The numbers of a method, of which its scheme is made.
+pub(super) trait Start {
+    /// Makes the scheme of a fluid that is new, or that goes on from a state which will be restored, and finds
+    /// densities and forces of the first instant.
+    fn start(self, core: &mut Core, is_new: bool) -> Box<dyn Scheme>;
+}
+
 /// A method at work, with what it keeps between steps.
 pub(in crate::sph) trait Scheme: Send + Sync {
     /// Advances by one step of at most `longest` seconds, and returns how long it was.

@@ -7,7 +7,6 @@ mod solver;
 mod start;
 mod walls;
 
-pub(super) use scheme::DivergenceFree;
 pub(super) use start::spread;
 
 use super::declaration::{Absence, Declaration, FluidDefaults, Key, KeyBlock, Support, Value};
@@ -163,6 +162,11 @@ impl Numerics for Dfsph {
         let sound = NOMINAL_SOUND * scales.expected_speed;
         let alpha = self.artificial_viscosity.max(Self::default().artificial_viscosity);
         roughness::viscosity(alpha, sound, scales.support_radius)
+    }
+
+    /// Its pressures act in pairs.
+    fn drag_is_too_large(&self) -> bool {
+        true
     }
 
     fn sound_speed(&self, _scales: &Scales) -> f64 {

@@ -57,7 +57,7 @@ use smallvec::{SmallVec, smallvec};
 use super::super::{
     free_surface::FreeSurface,
     roughness::{self, Roughness},
-    scheme::Scheme,
+    scheme::{Scheme, Start},
     shifting::{depth, restore_crowding, save_crowding, shift},
     tension::Tension,
 };
@@ -221,16 +221,17 @@ impl Scheme for DivergenceFree {
     }
 }
 
-impl DivergenceFree {
-    /// Makes the scheme of a fluid that is new, or that goes on from a state which will be restored.
-    pub fn start(numbers: Dfsph, core: &mut Core, is_new: bool) -> Self {
-        let mut scheme = Self::at(numbers, core);
+impl Start for Dfsph {
+    fn start(self, core: &mut Core, is_new: bool) -> Box<dyn Scheme> {
+        let mut scheme = DivergenceFree::at(self, core);
         if is_new {
             scheme.settle_in(core);
         }
-        scheme
+        Box::new(scheme)
     }
+}
 
+impl DivergenceFree {
     /// Makes the scheme for the present positions.
     pub(super) fn at(numbers: Dfsph, core: &mut Core) -> Self {
         let n = core.particles.len();

@@ -5,8 +5,6 @@ mod scheme;
 
 use std::f64::consts::PI;
 
-pub(super) use scheme::PaperScheme;
-
 use super::declaration::{Absence, Declaration, FluidDefaults, Key, KeyBlock, Support, Value};
 use super::negative_pressure::NegativePressure;
 use super::numerics::Numerics;
@@ -109,6 +107,11 @@ impl Numerics for Paper {
     /// None: the viscosity of this method is the fluid's own.
     fn numerical_viscosity(&self, _scales: &Scales) -> f64 {
         0.0
+    }
+
+    /// Its fluid is as viscous as the paper's, and that causes more drag than the method does.
+    fn drag_is_too_large(&self) -> bool {
+        false
     }
 
     /// The speed of sound √(dp/dρ) = √k.

@@ -16,7 +16,7 @@
 use fearless_simd::{Simd, SimdFloat};
 use glam::DVec3;
 
-use super::super::scheme::Scheme;
+use super::super::scheme::{Scheme, Start};
 use super::Paper;
 use crate::sph::{
     core::Core,
@@ -57,16 +57,18 @@ impl Scheme for PaperScheme {
     }
 }
 
-impl PaperScheme {
-    pub fn start(numbers: Paper, core: &mut Core) -> Self {
+impl Start for Paper {
+    fn start(self, core: &mut Core, _is_new: bool) -> Box<dyn Scheme> {
         let kernels = Kernels::new(core.parameters.support_radius);
-        let mut scheme = Self { numbers, kernels, volume: Vec::new() };
+        let mut scheme = PaperScheme { numbers: self, kernels, volume: Vec::new() };
         core.sort(&mut []);
         scheme.find_density_and_pressure(core);
         scheme.find_accelerations(core, 0.0);
-        scheme
+        Box::new(scheme)
     }
+}
 
+impl PaperScheme {
     fn find_density_and_pressure(&self, core: &mut Core) {
         let mut density = std::mem::take(&mut core.particles.density);
         density.resize(core.particles.len(), 0.0);

@@ -4,11 +4,9 @@ mod numbers;
 mod passes;
 mod scheme;
 
-pub(super) use scheme::Weakly;
-
 use super::declaration::{Absence, Declaration, FluidDefaults, Key, KeyBlock, Support, Value};
 use super::negative_pressure::NegativePressure;
-use super::numerics::Numerics;
+use super::numerics::{Numerics, StatedSound};
 use super::roughness;
 use crate::precision::Precision;
 use crate::quantity::{Bound, Dimension};
@@ -94,7 +92,7 @@ impl Wcsph {
 
     /// The speed √(u² + σ/ρa), m/s, whose square times the rest density is the greatest pressure that is expected: of the expected
     /// speed u, and of ripples. Surface tension presses with 2σ/r on a drop of the radius r, which is at least two spacings a.
-    pub(crate) fn driven_speed(&self, scales: &Scales) -> f64 {
+    fn driven_speed(&self, scales: &Scales) -> f64 {
         scales.expected_speed.hypot(ripples(scales))
     }
 
@@ -264,6 +262,16 @@ impl Numerics for Wcsph {
     fn numerical_viscosity(&self, scales: &Scales) -> f64 {
         let alpha = self.artificial_viscosity.unwrap_or(PAIRS_ALPHA).max(PAIRS_ALPHA);
         roughness::viscosity(alpha, self.sound_speed(scales), scales.support_radius)
+    }
+
+    /// With differences the pressures on a surface are right.
+    fn drag_is_too_large(&self) -> bool {
+        self.gradients == Gradients::Pairs
+    }
+
+    fn stated_sound(&self, scales: &Scales) -> Option<StatedSound> {
+        let driven_speed = self.driven_speed(scales);
+        self.sound_speed.map(|sound_speed| StatedSound { sound_speed, driven_speed })
     }
 
     fn validate(&self, scales: &Scales) -> Result<(), ParameterError> {

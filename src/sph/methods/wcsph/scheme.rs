@@ -54,8 +54,9 @@ use glam::DVec3;
 use rayon::prelude::*;
 
 use super::super::{
+    dfsph::spread,
     roughness::Roughness,
-    scheme::Scheme,
+    scheme::{Scheme, Start},
     shifting::{restore_crowding, save_crowding, shift},
     tension::Tension,
 };
@@ -166,8 +167,18 @@ impl Scheme for Weakly {
     }
 }
 
+impl Start for Wcsph {
+    fn start(self, core: &mut Core, is_new: bool) -> Box<dyn Scheme> {
+        if is_new {
+            spread(core);
+        }
+        Box::new(Weakly::at(&self, core))
+    }
+}
+
 impl Weakly {
-    pub fn start(wcsph: &Wcsph, core: &mut Core) -> Self {
+    /// Makes the scheme for the present positions and velocities.
+    fn at(wcsph: &Wcsph, core: &mut Core) -> Self {
         let numbers = Numbers::of(wcsph, &core.parameters);
         let n = core.particles.len();
         // a particle without a density starts at the rest density
