@@ -246,11 +246,11 @@ mod tests {
             slip: Slip::No,
             adaptive: true,
             precision: Precision::F32,
-            ..Parameters::default()
+            ..Parameters::paper()
         };
         let wcsph = Wcsph { sound_speed: Some(30.0), ..Wcsph::default() };
         [
-            Parameters::default(),
+            Parameters::paper(),
             Parameters { method: Method::Wcsph(wcsph), ..water.clone() },
             Parameters { method: Method::Dfsph(Dfsph::default()), ..water },
         ]

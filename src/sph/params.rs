@@ -10,20 +10,22 @@ use super::scales::{Scales, Slip};
 use crate::precision::Precision;
 use crate::quantity::Bound;
 
-/// The parameters of a fluid. Defaults are table 1 of the paper where it has a row.
+/// The parameters of a fluid. [`Parameters::of`] fills them in for a method and a size of particles,
+/// [`Parameters::paper`] with table 1 of the paper. The default is water in the default method, in particles of 20 g.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Parameters {
     /// Rest density ρ₀, kg/m³. 998.29: water at 20 °C (table 1).
     pub rest_density: f64,
-    /// Mass of one particle m, kg. 0.02 (table 1); with ρ₀ it fixes the spacing (m/ρ₀)^⅓ = 27.2 mm.
+    /// Mass of one particle m, kg. With ρ₀ it fixes the spacing (m/ρ₀)^⅓: 27.2 mm for 0.02 (table 1) in water.
     pub particle_mass: f64,
-    /// Support radius h, m: every kernel is zero beyond it. 0.1 (table 1), that is 3.7 spacings and some
-    /// 200 neighbours; 0.055 would give 30.
+    /// Support radius h, m: every kernel is zero beyond it. By default it suits the method: 0.1 (table 1) for the paper's,
+    /// that is 3.7 spacings and some 200 neighbours, and fewer spacings for the others.
     pub support_radius: f64,
-    /// Dynamic viscosity, Pa·s (the paper's ν). 3.5 (table 1), 3500 times that of water. Zero: the pass does
-    /// not run.
+    /// Dynamic viscosity, Pa·s (the paper's ν). By default that of water; in the paper's method 3.5 (table 1), 3500
+    /// times as much. Zero: the pass does not run.
     pub viscosity: f64,
-    /// Surface tension σ, N/m. 0.0728 (table 1): water against air. Zero: the pass does not run.
+    /// Surface tension σ, N/m. By default none; in the paper's method 0.0728 (table 1): water against air. Zero: the pass
+    /// does not run.
     pub surface_tension: f64,
     /// Gravity, m/s². (0, 0, −9.81). Zero: the pass does not run.
     pub gravity: DVec3,
@@ -32,8 +34,8 @@ pub struct Parameters {
     /// Restitution c_R of the container's walls, 0 (stick) to 1 (mirror). 0.5: half of the normal speed
     /// returns.
     pub wall_restitution: f64,
-    /// Time step dt, s. 0.002: below [`Parameters::stable_dt`] of the paper's scene (2.7 ms after a fall of 3
-    /// m), so that no particle crosses more than a sixth of its support in one step. The paper's own 0.01 is
+    /// Time step dt, s, or the longest one if steps are adaptive. For the paper's method 0.002: below
+    /// [`Parameters::stable_dt`] of the paper's scene (2.7 ms after a fall of 3 m), so that no particle crosses more than a sixth of its support in one step. The paper's own 0.01 is
     /// three times the bound; in that scene, soft and viscous as it is, it still does not diverge, but loses
     /// 3 % more energy in the first second.
     pub time_step: f64,
@@ -41,7 +43,7 @@ pub struct Parameters {
     /// [`Simulation::stable_dt`](super::Simulation::stable_dt).
     pub adaptive: bool,
     /// The greatest speed that is expected, m/s. A compressible method derives its speed of sound from it,
-    /// unless that is stated. 7.7: a fall through the paper's box, 3 m.
+    /// unless that is stated. 7.7 by default: a fall through the paper's box, 3 m.
     pub expected_speed: f64,
     /// The method that finds the pressure, with its numbers.
     pub method: Method,
@@ -62,31 +64,60 @@ pub struct Parameters {
     pub precision: Precision,
 }
 
+/// The density of water at 20 °C, kg/m³.
+const WATER: f64 = 998.29;
+
+/// The mass of a particle, kg, in the paper's table 1.
+const PAPER_MASS: f64 = 0.02;
+
+/// The longest step of methods whose steps follow the state, s.
+const LONGEST_STEP: f64 = 0.01;
+
 impl Default for Parameters {
+    /// Water at 20 °C in the default method, in particles of 20 g.
     fn default() -> Self {
-        Self {
-            rest_density: 998.29,
-            particle_mass: 0.02,
-            support_radius: 0.1,
-            viscosity: 3.5,
-            surface_tension: 0.0728,
-            gravity: DVec3::new(0.0, 0.0, -9.81),
-            most_gravity: 0.0,
-            wall_restitution: 0.5,
-            time_step: 0.002,
-            adaptive: false,
-            expected_speed: 7.7,
-            method: Paper::default().into(),
-            slip: Slip::Free,
-            sticks: false,
-            wall_friction: 0.0,
-            fills_vessel: false,
-            precision: Precision::F64,
-        }
+        Self { particle_mass: PAPER_MASS, ..Self::of(Method::default(), (PAPER_MASS / WATER).cbrt()) }
     }
 }
 
 impl Parameters {
+    /// Water at 20 °C in particles with this spacing, m. Viscosity, surface tension, support radius, precision and steps
+    /// are the defaults of the method, as in a scene that states none of them. Walls let the fluid slip, and speeds up to
+    /// a fall of 3 m are expected.
+    pub fn of(method: impl Into<Method>, spacing: f64) -> Self {
+        let method = method.into();
+        let fluid = method.fluid();
+        let mut parameters = Self {
+            rest_density: WATER,
+            particle_mass: WATER * spacing.powi(3),
+            support_radius: method.support(fluid.surface_tension > 0.0).radius(spacing),
+            viscosity: fluid.viscosity,
+            surface_tension: fluid.surface_tension,
+            gravity: DVec3::new(0.0, 0.0, -9.81),
+            most_gravity: 0.0,
+            wall_restitution: 0.5,
+            time_step: LONGEST_STEP,
+            adaptive: fluid.adaptive,
+            expected_speed: 7.7,
+            method,
+            slip: Slip::Free,
+            sticks: false,
+            wall_friction: 0.0,
+            fills_vessel: false,
+            precision: fluid.precision,
+        };
+        if !parameters.adaptive {
+            parameters.time_step = parameters.stable_dt(parameters.expected_speed);
+        }
+        parameters
+    }
+
+    /// Table 1 of the paper, in the paper's method, with steps of 2 ms.
+    pub fn paper() -> Self {
+        let fluid = Self::of(Paper::default(), (PAPER_MASS / WATER).cbrt());
+        Self { particle_mass: PAPER_MASS, time_step: 0.002, ..fluid }
+    }
+
     /// Checks all parameters and the numbers of the method.
     ///
     /// # Errors
@@ -237,13 +268,31 @@ mod tests {
 
     #[test]
     fn table_1_is_valid() {
-        assert_eq!(Parameters::default().validate(), Ok(()));
+        let paper = Parameters::paper();
+        assert_eq!(paper.validate(), Ok(()));
+        let Parameters { rest_density, particle_mass, support_radius, viscosity, surface_tension, .. } =
+            paper;
+        let table = [rest_density, particle_mass, support_radius, viscosity, surface_tension];
+        assert_eq!(table, [998.29, 0.02, 0.1, 3.5, 0.0728]);
+        assert!(!paper.adaptive && paper.precision == Precision::F64);
+    }
+
+    #[test]
+    fn parameters_of_a_method_are_its_defaults() {
+        assert_eq!(Parameters::default().method, Method::default());
+        for method in Method::all() {
+            let (parameters, fluid) = (Parameters::of(method, 0.03), method.fluid());
+            assert_eq!(parameters.validate(), Ok(()), "{}", method.name());
+            assert_eq!((parameters.viscosity, parameters.adaptive), (fluid.viscosity, fluid.adaptive));
+            assert!((parameters.spacing() / 0.03 - 1.0).abs() < 1e-12);
+            assert!(parameters.adaptive || parameters.time_step <= parameters.stable_dt(7.7));
+        }
     }
 
     #[test]
     fn each_wrong_value_is_named() {
         let check = |change: fn(&mut Parameters), name: &str| {
-            let mut parameters = Parameters::default();
+            let mut parameters = Parameters::paper();
             change(&mut parameters);
             assert_eq!(parameters.validate().map_err(|e| e.name), Err(name));
         };
@@ -258,7 +307,7 @@ mod tests {
         }
         check(|p| slow(p, 0.0), "sound_speed");
         // ripples have a speed where nothing else moves
-        let mut drop = Parameters::default();
+        let mut drop = Parameters::paper();
         slow(&mut drop, 1.0);
         assert_eq!(drop.validate(), Ok(()));
         check(|p| p.method = Dfsph { tolerance: 2.0, ..Dfsph::default() }.into(), "compression");
@@ -267,7 +316,7 @@ mod tests {
         check(|p| p.wall_restitution = 1.5, "wall_restitution");
         check(|p| p.gravity.y = f64::NAN, "gravity");
         check(|p| p.time_step = 0.0, "time_step");
-        let error = Parameters { viscosity: -1.0, ..Parameters::default() }.validate().unwrap_err();
+        let error = Parameters { viscosity: -1.0, ..Parameters::paper() }.validate().unwrap_err();
         assert_eq!(error.to_string(), "viscosity is -1, expected a finite number of at least 0");
     }
 }

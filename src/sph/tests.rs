@@ -30,7 +30,7 @@ fn lone(time_step: f64, wall_restitution: f64) -> Parameters {
         surface_tension: 0.0,
         time_step,
         wall_restitution,
-        ..Parameters::default()
+        ..Parameters::paper()
     }
 }
 
@@ -47,7 +47,7 @@ fn free_fall_is_exact() {
 
 #[test]
 fn momentum_is_conserved_in_free_space() {
-    let parameters = Parameters { gravity: DVec3::ZERO, surface_tension: 0.0, ..Parameters::default() };
+    let parameters = Parameters { gravity: DVec3::ZERO, surface_tension: 0.0, ..Parameters::paper() };
     let mut simulation = scenes::free_cloud(parameters, 400, 0.15);
     let before = simulation.stats().momentum;
     for _ in 0..100 {
@@ -179,7 +179,7 @@ fn nothing_creeps_under_an_obstacle_that_stands_on_the_floor() {
 #[test]
 fn a_drop_on_the_pawn_stays_sound_and_gains_no_energy() {
     let pawn = scenes::pawn();
-    let mut simulation = scenes::drop_on(&pawn, Parameters::default(), 2000);
+    let mut simulation = scenes::drop_on(&pawn, Parameters::paper(), 2000);
     let energy = |s: &super::Stats| s.kinetic_energy + s.potential_energy;
     let start = energy(&simulation.stats());
     let mut highest: f64 = 0.0;
@@ -202,7 +202,7 @@ fn the_same_bits_for_any_number_of_threads() {
     let run = |threads| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
         pool.install(|| {
-            let mut simulation = scenes::drop_on(&pawn, Parameters::default(), 1000);
+            let mut simulation = scenes::drop_on(&pawn, Parameters::paper(), 1000);
             for _ in 0..200 {
                 simulation.step().unwrap();
             }
@@ -234,7 +234,7 @@ fn a_run_that_would_never_end_is_an_error() {
         method: Method::Dfsph(Dfsph::default()),
         adaptive: true,
         time_step: 0.1,
-        ..Parameters::default()
+        ..Parameters::paper()
     };
     let mut simulation =
         Simulation::new(fall, one(DVec3::ONE, DVec3::ZERO), scenes::BOX, Vec::new()).unwrap();
@@ -253,7 +253,7 @@ fn wcsph_pairs_conserve_momentum_in_free_space() {
         surface_tension: 0.0,
         method: Method::Wcsph(wcsph),
         time_step: 1e-4,
-        ..Parameters::default()
+        ..Parameters::paper()
     };
     let mut simulation = scenes::free_cloud(parameters, 400, 0.15);
     let before = simulation.stats().momentum;
@@ -270,7 +270,7 @@ fn a_diverging_run_names_the_step_as_the_cause() {
         method: Paper { stiffness: 1e300, ..Paper::default() }.into(),
         time_step: 1e10,
         rest_density: 1.0,
-        ..Parameters::default()
+        ..Parameters::paper()
     };
     let mut simulation = scenes::free_drop(wild, 50);
     let error = (0..100).find_map(|_| simulation.step().err()).unwrap();
@@ -282,7 +282,7 @@ fn a_diverging_run_names_the_step_as_the_cause() {
 fn setups_without_meaning_are_refused() {
     let pawn = scenes::pawn();
     let new = |particles: Particles, domain: Aabb| {
-        Simulation::new(Parameters::default(), particles, domain, vec![scenes::obstacle(&pawn)]).err()
+        Simulation::new(Parameters::paper(), particles, domain, vec![scenes::obstacle(&pawn)]).err()
     };
     let fluid = one(DVec3::splat(2.5), DVec3::ZERO);
     assert_eq!(new(Particles::default(), scenes::BOX), Some(SetupError::NoParticles));
@@ -300,7 +300,7 @@ fn passes_that_a_scene_does_not_need_do_not_run() {
     use Pass::*;
     assert_eq!(plain.passes(), [Integrate, Walls, Neighbours, Density, Gravity]);
     let pawn = scenes::pawn();
-    let full = scenes::drop_on(&pawn, Parameters::default(), 10);
+    let full = scenes::drop_on(&pawn, Parameters::paper(), 10);
     assert_eq!(full.passes().len(), 9);
 }
 
@@ -311,7 +311,7 @@ fn kept_tension_makes_a_pair_coincide_and_clamping_does_not() {
             gravity: DVec3::ZERO,
             surface_tension: 0.0,
             method: Paper { negative_pressure, ..Paper::default() }.into(),
-            ..Parameters::default()
+            ..Parameters::paper()
         };
         let mut simulation =
             scenes::free(parameters, &[(DVec3::ZERO, DVec3::ZERO), (DVec3::X * 0.05, DVec3::ZERO)]);
@@ -340,8 +340,8 @@ fn weightless(method: Method, spacing: f64) -> Parameters {
         adaptive: true,
         time_step: 0.1,
         expected_speed: 4.0,
-        method,
-        ..Parameters::default()
+        precision: crate::sph::Precision::F64,
+        ..Parameters::of(method, spacing)
     }
 }
 

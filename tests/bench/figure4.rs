@@ -179,14 +179,14 @@ fn simulation(scene: &Scene, pawn: &Solid, count: usize) -> Simulation {
     let mut parameters = Parameters {
         rest_density: scene.fluid.density,
         particle_mass: scene.fluid.mass,
-        support_radius: scene.fluid.support_radius.unwrap_or(Parameters::default().support_radius),
+        support_radius: scene.fluid.support_radius.unwrap_or(Parameters::paper().support_radius),
         viscosity: scene.fluid.viscosity,
         surface_tension: scene.fluid.surface_tension,
         method: scene.method,
         gravity,
         wall_restitution: scene.walls.restitution,
         time_step: 1.0,
-        ..Parameters::default()
+        ..Parameters::paper()
     };
     let fall = (2.0 * gravity.length() * scene.domain.size().z).sqrt();
     parameters.time_step = parameters.stable_dt(fall);

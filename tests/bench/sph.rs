@@ -56,11 +56,10 @@ fn parameters(particles: usize, method: Method, precision: Precision) -> Paramet
         support_radius: support(method) * spacing,
         viscosity: 0.0,
         surface_tension: 0.0,
-        method,
         precision,
         adaptive: true,
         time_step: 1.0,
-        ..Parameters::default()
+        ..Parameters::of(method, spacing)
     }
 }
 

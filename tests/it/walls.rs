@@ -49,7 +49,7 @@ fn fly(field: Arc<dyn Walls>, starts: &[DVec3], steps: usize, check: &dyn Fn(DVe
         support_radius: 0.01,
         time_step: 0.002,
         wall_restitution: 1.0,
-        ..Parameters::default()
+        ..Parameters::paper()
     };
     let domain = Aabb::new(DVec3::splat(-1.0), DVec3::splat(1.0));
     // an infinite resolution, because nothing may depend on it

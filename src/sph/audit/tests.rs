@@ -18,8 +18,8 @@ fn parameters(method: Method, spacing: f64) -> Parameters {
         adaptive: true,
         time_step: 0.1,
         expected_speed: 4.0,
-        method,
-        ..Parameters::default()
+        precision: crate::sph::Precision::F64,
+        ..Parameters::of(method, spacing)
     }
 }
 

@@ -28,8 +28,8 @@ fn water(method: Method) -> Parameters {
         surface_tension: 0.0,
         time_step: 1.0,
         adaptive: true,
-        method,
-        ..Parameters::default()
+        precision: crate::sph::Precision::F64,
+        ..Parameters::of(method, SPACING)
     }
 }
 
@@ -268,7 +268,7 @@ fn lone(height: f64, restitution: f64, block: &Arc<dyn Walls>) -> Simulation {
         viscosity: 0.0,
         surface_tension: 0.0,
         time_step: 1e-4,
-        ..Parameters::default()
+        ..Parameters::paper()
     };
     let mut particles = Particles::default();
     particles.push(DVec3::new(1.0, 2.0, 1.0 + height), DVec3::ZERO);

@@ -249,7 +249,7 @@ mod tests {
 
     #[test]
     fn a_drop_has_exactly_its_number_of_particles() {
-        let parameters = Parameters::default();
+        let parameters = Parameters::paper();
         for count in [1, 2, 7, 500] {
             let drop = FluidBlock::drop(DVec3::splat(1.5), count).seed(&parameters, scenes::BOX).unwrap();
             assert_eq!(drop.len(), count);
@@ -264,7 +264,7 @@ mod tests {
 
     #[test]
     fn jitter_is_seeded_and_never_makes_particles_coincide() {
-        let parameters = Parameters::default();
+        let parameters = Parameters::paper();
         let block = FluidBlock { jitter: 0.99, seed: 7, ..FluidBlock::drop(DVec3::splat(1.5), 400) };
         let particles = block.seed(&parameters, scenes::BOX).unwrap();
         no_two_coincide(&particles, parameters.spacing());
@@ -276,7 +276,7 @@ mod tests {
 
     #[test]
     fn a_box_is_filled_from_below_and_says_how_many_fit() {
-        let parameters = Parameters::default();
+        let parameters = Parameters::paper();
         let side = 10.0 * parameters.spacing();
         let shape = FluidShape::Box(Aabb::new(DVec3::ZERO, DVec3::splat(side)));
         let full = FluidBlock::filling(shape).seed(&parameters, scenes::BOX).unwrap();
@@ -293,7 +293,7 @@ mod tests {
 
     #[test]
     fn a_field_bounds_its_fluid() {
-        let parameters = Parameters::default();
+        let parameters = Parameters::paper();
         let sphere = scenes::sphere(DVec3::splat(1.5), 0.2);
         let shape = FluidShape::Field { field: &*sphere, bounds: scenes::BOX, fill: Fill::Below };
         let fluid = FluidBlock::filling(shape).seed(&parameters, scenes::BOX).unwrap();
@@ -303,7 +303,7 @@ mod tests {
 
     #[test]
     fn infinite_and_empty_shapes_are_errors_or_empty() {
-        let parameters = Parameters::default();
+        let parameters = Parameters::paper();
         let all = Aabb::new(DVec3::NEG_INFINITY, DVec3::INFINITY);
         let infinite = FluidBlock::filling(FluidShape::Box(all)).seed(&parameters, all);
         assert!(matches!(infinite, Err(SeedError::TooLarge { .. })));

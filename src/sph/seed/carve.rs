@@ -268,7 +268,7 @@ mod tests {
         let volume = 8.0 - std::f64::consts::PI / 6.0;
         for layers in [10.0, 13.0, 20.0] {
             let spacing = 2.0 / layers;
-            let parameters = Parameters::default();
+            let parameters = Parameters::paper();
             let block = FluidBlock {
                 cell: Some(DVec3::splat(spacing)),
                 ..FluidBlock::filling(FluidShape::Box(domain))
@@ -307,7 +307,7 @@ mod tests {
                 cell: Some(DVec3::splat(spacing)),
                 ..FluidBlock::filling(FluidShape::Box(domain))
             };
-            let mut particles = lattice.seed(&Parameters::default(), domain).unwrap();
+            let mut particles = lattice.seed(&Parameters::paper(), domain).unwrap();
             let cells = (8.0 * f64::powi(side / spacing, 3)).round() as usize;
             carve_cells(&mut particles, &domain, &[obstacle], (spacing, 0.5 * spacing), cells).unwrap();
             assert!(closest(&particles) > 0.5 * spacing, "{side}: {}", closest(&particles) / spacing);
@@ -330,7 +330,7 @@ mod tests {
                 cell: Some(DVec3::splat(spacing)),
                 ..FluidBlock::filling(FluidShape::Box(domain))
             };
-            let mut particles = lattice.seed(&Parameters::default(), domain).unwrap();
+            let mut particles = lattice.seed(&Parameters::paper(), domain).unwrap();
             carve_cells(&mut particles, &domain, &[obstacle], (spacing, 0.5 * spacing), 300).unwrap();
             let below: Vec<f64> = particles.position.iter().map(|p| p.z).filter(|z| *z < height).collect();
             assert_eq!(!below.is_empty(), is_free, "{height}: {below:?}");

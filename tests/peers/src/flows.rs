@@ -83,11 +83,10 @@ fn ours(name: &'static str, spacing: f64, dt: f64, method: Method, precision: Pr
         support_radius: SUPPORT * spacing,
         viscosity: 0.0,
         surface_tension: 0.0,
-        method,
         precision,
         adaptive: dt.is_infinite(),
         time_step: dt.min(1.0),
-        ..Parameters::default()
+        ..Parameters::of(method, spacing)
     };
     let fluid = FluidBlock::filling(FluidShape::Box(COLUMN)).seed(&parameters, BOX).expect("room");
     let particles = fluid.len();
@@ -141,7 +140,7 @@ fn salva(spacing: f64, dt: f64) -> Row {
 /// Middles of the cells of a column of cubes, where rfm puts its particles.
 fn lattice(spacing: f64) -> Vec<Vector<f32>> {
     let parameters =
-        Parameters { rest_density: 1000.0, particle_mass: 1000.0 * spacing.powi(3), ..Parameters::default() };
+        Parameters { rest_density: 1000.0, particle_mass: 1000.0 * spacing.powi(3), ..Parameters::paper() };
     let fluid = FluidBlock::filling(FluidShape::Box(COLUMN)).seed(&parameters, BOX).expect("room");
     fluid.position.iter().map(|p| Vector::new(p.x as f32, p.y as f32, p.z as f32)).collect()
 }

@@ -507,11 +507,11 @@ mod tests {
                 expected_speed: 3.0,
                 time_step: 1.0,
                 method: Dfsph::default().into(),
-                ..Parameters::default()
+                ..Parameters::paper()
             };
             relaxation_time(&parameters, 0.0, dt)
         };
-        let fall = (Parameters::default().support_radius / 9.81).sqrt();
+        let fall = (Parameters::paper().support_radius / 9.81).sqrt();
         for (gravity, most_gravity) in [(9.81, 0.0), (0.0, 9.81)] {
             for dt in [1e-3, 1e-5, 1e-7] {
                 let found = of(gravity, most_gravity, dt);

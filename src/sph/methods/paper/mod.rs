@@ -167,7 +167,7 @@ mod tests {
 
     #[test]
     fn the_papers_step_exceeds_the_stable_one_of_its_scene() {
-        let parameters = Parameters::default();
+        let parameters = Parameters::paper();
         let fall = (2.0f64 * 9.81 * 3.0).sqrt();
         let dt = parameters.stable_dt(fall);
         assert!(parameters.time_step < dt && dt < 0.003, "{dt}");
