@@ -39,6 +39,10 @@ impl Dimension {
     pub const TENSION: Self = Self::new(0, 1, -2, 0);
     /// Energy, J.
     pub const ENERGY: Self = Self::new(2, 1, -2, 0);
+    /// Energy per mass, J/kg.
+    pub const SPECIFIC_ENERGY: Self = Self::new(2, 0, -2, 0);
+    /// One over a length, 1/m. Scenes write it as `m^-1`.
+    pub const PER_LENGTH: Self = Self::new(-1, 0, 0, 0);
     /// Force, N.
     pub const FORCE: Self = Self::new(1, 1, -2, 0);
     /// Pressure, Pa.
@@ -53,7 +57,7 @@ impl Dimension {
 
     /// The SI unit as a scene writes it; `None` for a plain number.
     pub fn unit(self) -> Option<&'static str> {
-        const UNITS: [(Dimension, &str); 13] = [
+        const UNITS: [(Dimension, &str); 15] = [
             (Dimension::LENGTH, "m"),
             (Dimension::MASS, "kg"),
             (Dimension::TIME, "s"),
@@ -64,6 +68,8 @@ impl Dimension {
             (Dimension::VISCOSITY, "Pa·s"),
             (Dimension::TENSION, "N/m"),
             (Dimension::ENERGY, "J"),
+            (Dimension::SPECIFIC_ENERGY, "J/kg"),
+            (Dimension::PER_LENGTH, "m^-1"),
             (Dimension::FORCE, "N"),
             (Dimension::PRESSURE, "Pa"),
             (Dimension::MASS_FLOW, "kg/s"),
@@ -257,6 +263,8 @@ mod tests {
         check("Pa·s", 1.0, Dimension::VISCOSITY);
         check("mPa·s", 1e-3, Dimension::VISCOSITY);
         check("N/m", 1.0, Dimension::TENSION);
+        check("kJ/kg", 1e3, Dimension::SPECIFIC_ENERGY);
+        check("m^-1", 1.0, Dimension::PER_LENGTH);
         check("m/s^2", 1.0, Dimension::ACCELERATION);
         check("mm", 1e-3, Dimension::LENGTH);
         assert_eq!(parse_unit("furlong"), None);

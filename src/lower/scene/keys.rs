@@ -321,7 +321,17 @@ impl<'a> Lowering<'a> {
                         Some(unit) => format!("write for example `1 {unit}`"),
                         None => format!("`{key}` has no unit"),
                     };
-                    self.report(Diagnostic::error(Code::UNIT_MISMATCH, unit.span, message).help(help));
+                    let diagnostic = Diagnostic::error(Code::UNIT_MISMATCH, unit.span, message);
+                    let is_whole =
+                        (parsed.dimension, expected) == (Dimension::ENERGY, Dimension::SPECIFIC_ENERGY);
+                    self.report(if is_whole {
+                        let per_mass = format!("{}/kg", unit.text);
+                        diagnostic
+                            .help(format!("`{key}` is per kilogram: write `{per_mass}`"))
+                            .edit(unit.span, &unit.text, per_mass, false)
+                    } else {
+                        diagnostic.help(help)
+                    });
                     return None;
                 }
                 self.may_be_number(*value, expr).then_some(value * parsed.factor)

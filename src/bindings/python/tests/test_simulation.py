@@ -190,7 +190,7 @@ def test_bad_goals(drop):
 
 def test_an_end_by_numbers_is_an_error_and_final():
     # far too stiff for its step
-    text = (EXAMPLES / "pawn.rfm").read_text().replace("stiffness: 3 J", "stiffness: 3000000 J")
+    text = (EXAMPLES / "pawn.rfm").read_text().replace("stiffness: 3 J/kg", "stiffness: 3000000 J/kg")
     simulation = rfm.load(text.replace("until: 5 s,", "until: 5 s, dt: 50 ms,"), particles=300).scene()
     assert any(found.severity == "warning" for found in simulation.warnings)
     with pytest.raises(rfm.RfmError) as ended:

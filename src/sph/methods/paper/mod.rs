@@ -60,9 +60,9 @@ impl Declaration for Paper {
         Key {
             name: "stiffness",
             block: KeyBlock::Fluid,
-            about: "k of the equation of state p = k(ρ − ρ₀), per kilogram",
+            about: "k of the equation of state p = k(ρ − ρ₀)",
             value: Value::Number {
-                dimension: Dimension::ENERGY,
+                dimension: Dimension::SPECIFIC_ENERGY,
                 bound: Bound::NotNegative,
                 get: |paper| Some(paper.stiffness),
                 set: |paper, stiffness| paper.stiffness = stiffness,
@@ -72,9 +72,9 @@ impl Declaration for Paper {
         Key {
             name: "threshold",
             block: KeyBlock::Fluid,
-            about: "gradient of the colour field, 1/m, above which a particle belongs to the surface",
+            about: "gradient of the colour field above which a particle belongs to the surface",
             value: Value::Number {
-                dimension: Dimension::NONE,
+                dimension: Dimension::PER_LENGTH,
                 bound: Bound::Positive,
                 get: |paper| Some(paper.surface_threshold),
                 set: |paper, threshold| paper.surface_threshold = threshold,
