@@ -301,7 +301,8 @@ impl Experiment {
         match self.estimated_particles() {
             Ok(_) => self.reach().ok().and_then(|bounds| self.outside(&bounds)).into_iter().collect(),
             Err(Error::Diagnostics(refusal)) => refusal.list,
-            Err(_) => Vec::new(),
+            // the compiler's own troubles are said when the scene is run
+            Err(Error::File { .. } | Error::UnknownName { .. } | Error::Codegen(_)) => Vec::new(),
         }
     }
 

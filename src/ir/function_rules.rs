@@ -183,7 +183,30 @@ impl UnaryFunction {
     /// Whether a value close to the largest number may come out infinite: sinh and cosh are found from eᵃ,
     /// which is twice as large.
     pub(super) fn overflows_early(self) -> bool {
-        matches!(self, Self::Sinh | Self::Cosh)
+        match self {
+            Self::Sinh | Self::Cosh => true,
+            Self::Sin | Self::Cos | Self::Tan | Self::Asin | Self::Acos | Self::Atan => false,
+            Self::Exp | Self::Ln | Self::Log2 | Self::Log10 | Self::Tanh => false,
+        }
+    }
+
+    /// Whether its value may be infinite at a finite operand without an overflow. No double lies exactly at a pole of
+    /// the tangent.
+    pub(super) fn has_pole(self) -> bool {
+        match self {
+            Self::Ln | Self::Log2 | Self::Log10 => true,
+            Self::Sin | Self::Cos | Self::Tan | Self::Asin | Self::Acos | Self::Atan => false,
+            Self::Exp | Self::Sinh | Self::Cosh | Self::Tanh => false,
+        }
+    }
+
+    /// Whether it is undefined at ±∞ though it is defined at all numbers before it.
+    pub(super) fn fails_at_infinity(self) -> bool {
+        match self {
+            Self::Sin | Self::Cos | Self::Tan => true,
+            Self::Asin | Self::Acos | Self::Atan | Self::Exp | Self::Ln | Self::Log2 | Self::Log10 => false,
+            Self::Sinh | Self::Cosh | Self::Tanh => false,
+        }
     }
 
     /// The true value; `None` where there is none.
@@ -228,6 +251,14 @@ pub(super) struct ChainOfTwo {
 }
 
 impl BinaryFunction {
+    /// Whether its value may be infinite at finite operands without an overflow: 0⁻¹.
+    pub(super) fn has_pole(self) -> bool {
+        match self {
+            Self::Pow => true,
+            Self::Atan2 => false,
+        }
+    }
+
     /// adjoint · ∂f/∂a, or with `first` unset adjoint · ∂f/∂b.
     pub(super) fn derivative(self, graph: &mut Graph, chain: ChainOfTwo, first: bool) -> Node {
         use Binary::{Add, DivOrZero, Mul, Sub};

@@ -2,71 +2,109 @@
 //!
 //! The code generator is tested against these values bit for bit. A new operation needs a rule in every
 //! analysis (derivative, range, magnitude, rounding error, contraction, enclosure along a path, truth), an
-//! instruction, and a form in source text. The compiler names these places, because their matches have no
-//! wildcard; only the lists for tests (`Unary::all`, `Binary::all`) and the name in the language
-//! (`lower::builtins`) may be forgotten without an error. A function of the mathematical library needs less,
-//! see `function`.
+//! instruction, a form in source text, and its place among the words of the language (`lower::builtins`). The
+//! compiler names these places, because their matches have no wildcard. A function of the mathematical
+//! library needs less, see `function`.
 
 use crate::ir::function::{BinaryFunction, UnaryFunction};
 use crate::ir::r0;
 use crate::ir::real::Real;
 
-/// An operation on one number.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-pub enum Unary {
-    /// −a
-    Neg,
-    /// |a|
-    Abs,
-    /// √a
-    Sqrt,
-    /// −1, 0 or 1; the derivative of |a|, 0 at 0 by convention.
-    Sign,
-    /// The largest whole number that is not above a.
-    Floor,
-    /// The nearest whole number; halfway between two the even one.
-    Round,
-    /// A function of the mathematical library.
-    Call(UnaryFunction),
+/// Declares operations, one on each line: their variant and their name in dumps. Functions of the mathematical library are
+/// operations too.
+macro_rules! operations {
+    (
+        $(#[$meta:meta])*
+        pub enum $type:ident with $function:ident {
+            $($(#[$variant_meta:meta])* $variant:ident $name:literal;)+
+        }
+    ) => {
+        $(#[$meta])*
+        #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+        pub enum $type {
+            $($(#[$variant_meta])* $variant,)+
+            /// A function of the mathematical library.
+            Call($function),
+        }
+
+        impl $type {
+            /// Every operation: those declared here, then the functions.
+            pub fn all() -> impl Iterator<Item = Self> {
+                let functions = $function::ALL.iter().copied().map(Self::Call);
+                [$(Self::$variant),+].into_iter().chain(functions)
+            }
+
+            /// Its name in dumps.
+            pub fn name(self) -> &'static str {
+                match self {
+                    $(Self::$variant => $name,)+
+                    Self::Call(function) => function.name(),
+                }
+            }
+        }
+
+        impl From<$function> for $type {
+            fn from(function: $function) -> Self {
+                Self::Call(function)
+            }
+        }
+    };
 }
 
-/// An operation on two numbers, a and b.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-pub enum Binary {
-    /// a + b
-    Add,
-    /// a − b
-    Sub,
-    /// a·b
-    Mul,
-    /// a/b
-    Div,
-    /// a/b, and 0 where b = 0: derivatives of roots at their singular point, where the limit set contains 0.
-    DivOrZero,
-    /// a·b, and 0 where b = 0 whatever a is, even if it is no number: b chooses whether a counts.
-    MulOrZero,
-    /// The smaller operand; NaN if either is NaN.
-    Min,
-    /// The larger operand; NaN if either is NaN.
-    Max,
-    /// The smaller operand, where both are known to be numbers: one instruction.
-    PlainMin,
-    /// The larger operand, where both are known to be numbers: one instruction.
-    PlainMax,
-    /// ∂min(a, b)/∂a: 1, ½ or 0 where a is smaller, equal or larger.
-    MinWeight,
-    /// ∂max(a, b)/∂a: 1, ½ or 0 where a is larger, equal or smaller.
-    MaxWeight,
-    /// A function of the mathematical library.
-    Call(BinaryFunction),
-    /// R₀-conjunction a ∧ b, see [`r0::and`].
-    And,
-    /// R₀-disjunction a ∨ b, see [`r0::or`].
-    Or,
-    /// ∂(a ∧ b)/∂a, see [`r0::and_weights`].
-    AndWeight,
-    /// ∂(a ∨ b)/∂a.
-    OrWeight,
+operations! {
+    /// An operation on one number.
+    pub enum Unary with UnaryFunction {
+        /// −a
+        Neg "neg";
+        /// |a|
+        Abs "abs";
+        /// √a
+        Sqrt "sqrt";
+        /// −1, 0 or 1; the derivative of |a|, 0 at 0 by convention.
+        Sign "sign";
+        /// The largest whole number that is not above a.
+        Floor "floor";
+        /// The nearest whole number; halfway between two the even one.
+        Round "round";
+    }
+}
+
+operations! {
+    /// An operation on two numbers, a and b.
+    pub enum Binary with BinaryFunction {
+        /// a + b
+        Add "add";
+        /// a − b
+        Sub "sub";
+        /// a·b
+        Mul "mul";
+        /// a/b
+        Div "div";
+        /// a/b, and 0 where b = 0: derivatives of roots at their singular point, where the limit set contains 0.
+        DivOrZero "div_or_zero";
+        /// a·b, and 0 where b = 0 whatever a is, even if it is no number: b chooses whether a counts.
+        MulOrZero "mul_or_zero";
+        /// The smaller operand; NaN if either is NaN.
+        Min "min";
+        /// The larger operand; NaN if either is NaN.
+        Max "max";
+        /// The smaller operand, where both are known to be numbers: one instruction.
+        PlainMin "plain_min";
+        /// The larger operand, where both are known to be numbers: one instruction.
+        PlainMax "plain_max";
+        /// ∂min(a, b)/∂a: 1, ½ or 0 where a is smaller, equal or larger.
+        MinWeight "min_weight";
+        /// ∂max(a, b)/∂a: 1, ½ or 0 where a is larger, equal or smaller.
+        MaxWeight "max_weight";
+        /// R₀-conjunction a ∧ b, see [`r0::and`].
+        And "r0_and";
+        /// R₀-disjunction a ∨ b, see [`r0::or`].
+        Or "r0_or";
+        /// ∂(a ∧ b)/∂a, see [`r0::and_weights`].
+        AndWeight "r0_and_weight";
+        /// ∂(a ∨ b)/∂a.
+        OrWeight "r0_or_weight";
+    }
 }
 
 /// An operation of the R₀ system. It is computed in one of several forms, see [`Form`](super::Form).
@@ -83,25 +121,6 @@ pub enum R0 {
 }
 
 impl Unary {
-    /// Every operation, for tests.
-    pub fn all() -> impl Iterator<Item = Self> {
-        let functions = UnaryFunction::ALL.iter().copied().map(Self::Call);
-        [Self::Neg, Self::Abs, Self::Sqrt, Self::Sign, Self::Floor, Self::Round].into_iter().chain(functions)
-    }
-
-    /// Its name in dumps.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Neg => "neg",
-            Self::Abs => "abs",
-            Self::Sqrt => "sqrt",
-            Self::Sign => "sign",
-            Self::Floor => "floor",
-            Self::Round => "round",
-            Self::Call(function) => function.name(),
-        }
-    }
-
     /// Whether it is constant between jumps: its derivative is taken to be 0.
     pub fn is_step(self) -> bool {
         match self {
@@ -124,65 +143,7 @@ impl Unary {
     }
 }
 
-impl From<UnaryFunction> for Unary {
-    fn from(function: UnaryFunction) -> Self {
-        Self::Call(function)
-    }
-}
-
-impl From<BinaryFunction> for Binary {
-    fn from(function: BinaryFunction) -> Self {
-        Self::Call(function)
-    }
-}
-
 impl Binary {
-    /// Every operation, for tests.
-    pub fn all() -> impl Iterator<Item = Self> {
-        let instructions = [
-            Self::Add,
-            Self::Sub,
-            Self::Mul,
-            Self::Div,
-            Self::DivOrZero,
-            Self::MulOrZero,
-            Self::Min,
-            Self::Max,
-            Self::PlainMin,
-            Self::PlainMax,
-            Self::MinWeight,
-            Self::MaxWeight,
-            Self::And,
-            Self::Or,
-            Self::AndWeight,
-            Self::OrWeight,
-        ];
-        instructions.into_iter().chain(BinaryFunction::ALL.iter().copied().map(Self::Call))
-    }
-
-    /// Its name in dumps.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Add => "add",
-            Self::Sub => "sub",
-            Self::Mul => "mul",
-            Self::Div => "div",
-            Self::DivOrZero => "div_or_zero",
-            Self::MulOrZero => "mul_or_zero",
-            Self::Min => "min",
-            Self::Max => "max",
-            Self::PlainMin => "plain_min",
-            Self::PlainMax => "plain_max",
-            Self::MinWeight => "min_weight",
-            Self::MaxWeight => "max_weight",
-            Self::Call(function) => function.name(),
-            Self::And => "r0_and",
-            Self::Or => "r0_or",
-            Self::AndWeight => "r0_and_weight",
-            Self::OrWeight => "r0_or_weight",
-        }
-    }
-
     /// Whether swapping the operands gives the same bits.
     pub fn commutes(self) -> bool {
         use Binary::{Add, And, Max, Min, Mul, Or, PlainMax, PlainMin};

@@ -3,7 +3,7 @@
 use super::lowering::Lowering;
 use super::value::Value;
 use crate::diagnostic::{Code, Diagnostic, Span};
-use crate::ir::{self, Binary, BinaryFunction, Node, Unary, UnaryFunction};
+use crate::ir::{self, Binary, BinaryFunction, Node, Unary};
 use crate::syntax::ast::{Argument, Expr, ExprKind, Name};
 
 /// A function of the language.
@@ -100,14 +100,32 @@ const POSITIVE: Builtin = Builtin {
     }),
 };
 
+/// Where operations stand in lists of builtins.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Place {
+    First,
+    Functions,
+    Steps,
+}
+
+/// Where an operation stands among the builtins; `None` if the language has a sign for it.
+fn place_in_lists(op: Unary) -> Option<Place> {
+    match op {
+        Unary::Neg => None,
+        Unary::Sqrt | Unary::Abs => Some(Place::First),
+        Unary::Call(_) => Some(Place::Functions),
+        Unary::Sign | Unary::Floor | Unary::Round => Some(Place::Steps),
+    }
+}
+
 /// All builtins.
 fn all() -> impl Iterator<Item = Builtin> {
     let operation = |op: Unary| Builtin { name: op.name(), arity: (1, 1), meaning: Meaning::Unary(op) };
-    let functions = UnaryFunction::ALL.iter().map(move |&function| operation(function.into()));
-    let instructions = [Unary::Sqrt, Unary::Abs].into_iter().map(operation);
-    instructions
-        .chain(functions)
-        .chain([Unary::Sign, Unary::Floor, Unary::Round].map(operation))
+    let with_place =
+        move |place| Unary::all().filter(move |&op| place_in_lists(op) == Some(place)).map(operation);
+    with_place(Place::First)
+        .chain(with_place(Place::Functions))
+        .chain(with_place(Place::Steps))
         .chain(COMPOSED.iter().copied())
         .chain([POSITIVE])
 }

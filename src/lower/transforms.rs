@@ -56,20 +56,35 @@ const METHODS: [(&str, Transform); 13] = [
     ("distance", Transform::Distance),
 ];
 
+/// What a parameter of a transformation takes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum ParameterKind {
+    Vector,
+    /// One angle for the whole shape.
+    Angle,
+    /// An angle that may differ from point to point.
+    LocalAngle,
+    /// A length; anything else has a message of its own.
+    Length,
+    /// A number or a vector; anything else has a message of its own.
+    Factor,
+}
+
 impl Transform {
-    /// The names of its parameters, in order.
-    fn parameters(self) -> &'static [&'static str] {
+    /// The names of its parameters, in order, and what they take.
+    fn parameters(self) -> &'static [(&'static str, ParameterKind)] {
+        use ParameterKind::{Angle, Factor, Length, LocalAngle, Vector};
         match self {
-            Self::Move => &["by"],
-            Self::RotateAbout(_) => &["angle"],
-            Self::Rotate => &["axis", "angle", "about"],
-            Self::Scale => &["factor"],
-            Self::Mirror => &["normal", "point"],
-            Self::At => &["place"],
-            Self::Turned => &["angle"],
-            Self::Repeat => &["step", "counts"],
-            Self::Round => &["radius", "inner"],
-            Self::Offset => &["d"],
+            Self::Move => &[("by", Vector)],
+            Self::RotateAbout(_) => &[("angle", Angle)],
+            Self::Rotate => &[("axis", Vector), ("angle", Angle), ("about", Vector)],
+            Self::Scale => &[("factor", Factor)],
+            Self::Mirror => &[("normal", Vector), ("point", Vector)],
+            Self::At => &[("place", Vector)],
+            Self::Turned => &[("angle", LocalAngle)],
+            Self::Repeat => &[("step", Vector), ("counts", Vector)],
+            Self::Round => &[("radius", Length), ("inner", Length)],
+            Self::Offset => &[("d", Length)],
             Self::Distance => &[],
         }
     }
@@ -92,8 +107,10 @@ impl Transform {
 }
 
 /// The methods of shapes, each with the names of its parameters.
-pub(super) fn methods() -> impl Iterator<Item = (&'static str, &'static [&'static str])> {
-    METHODS.into_iter().map(|(name, transform)| (name, transform.parameters()))
+pub(super) fn methods() -> impl Iterator<Item = (&'static str, Vec<&'static str>)> {
+    METHODS.into_iter().map(|(name, transform)| {
+        (name, transform.parameters().iter().map(|(parameter, _)| *parameter).collect())
+    })
 }
 
 /// A factor of a coordinate: a number, or a node that depends on time alone.
@@ -120,15 +137,13 @@ impl Turn {
 }
 
 /// Whether the arguments are vectors and numbers where the method takes these. A value that failed fits.
-fn kinds_fit(parameters: &[&str], values: &[(Value, Span)]) -> bool {
-    parameters.iter().zip(values).all(|(name, (value, _))| match (*name, value) {
+fn kinds_fit(parameters: &[(&str, ParameterKind)], values: &[(Value, Span)]) -> bool {
+    parameters.iter().zip(values).all(|((_, kind), (value, _))| match (kind, value) {
         (_, Value::Failed) => true,
-        ("by" | "axis" | "normal" | "about" | "point" | "place" | "step" | "counts", value) => {
-            // a list of another length has a message of its own
-            matches!(value, Value::Vector(_) | Value::List(_))
-        }
-        ("angle", value) => matches!(value, Value::Number(_)),
-        _ => true, // a factor may be both, and has a message of its own
+        // a list of another length has a message of its own
+        (ParameterKind::Vector, value) => matches!(value, Value::Vector(_) | Value::List(_)),
+        (ParameterKind::Angle | ParameterKind::LocalAngle, value) => matches!(value, Value::Number(_)),
+        (ParameterKind::Length | ParameterKind::Factor, _) => true,
     })
 }
 
@@ -169,16 +184,17 @@ impl<'a> Lowering<'a> {
         for (position, argument) in arguments.iter().enumerate() {
             let slot = match &argument.name {
                 None => (position < parameters.len()).then_some(position),
-                Some(name) => parameters.iter().position(|p| *p == name.text),
+                Some(name) => parameters.iter().position(|(parameter, _)| *parameter == name.text),
             };
             let Some(slot) = slot else {
                 return self.fail(self.wrong_arguments(method, parameters, arguments, span));
             };
             let value = self.expr(&argument.value);
-            if matches!(transform, Transform::Round | Transform::Offset) && !self.no_angle(&argument.value) {
+            let (_, kind) = parameters[slot];
+            if kind == ParameterKind::Length && !self.no_angle(&argument.value) {
                 return Value::Failed;
             }
-            if parameters[slot] == "angle" && transform != Transform::Turned {
+            if kind == ParameterKind::Angle {
                 if !self.no_length(&argument.value) {
                     return Value::Failed;
                 }
@@ -209,11 +225,12 @@ impl<'a> Lowering<'a> {
     fn wrong_arguments(
         &self,
         method: &Name,
-        parameters: &[&str],
+        parameters: &[(&str, ParameterKind)],
         arguments: &[Argument],
         span: Span,
     ) -> Diagnostic {
-        let message = format!("the arguments of `.{}` are ({})", method.text, parameters.join(", "));
+        let names: Vec<&str> = parameters.iter().map(|(name, _)| *name).collect();
+        let message = format!("the arguments of `.{}` are ({})", method.text, names.join(", "));
         let arguments: Vec<&Expr> = arguments.iter().map(|argument| &argument.value).collect();
         let help = format!("write `{}`", self.call_that_works(&method.text, &arguments));
         Diagnostic::error(Code::ARGUMENTS, self.user_span(span), message).help(help)

@@ -17,7 +17,7 @@ pub fn builtins() -> impl Iterator<Item = &'static str> {
 }
 
 /// The methods that are no text of the prelude, each with the names of its parameters.
-pub fn methods() -> impl Iterator<Item = (&'static str, &'static [&'static str])> {
+pub fn methods() -> impl Iterator<Item = (&'static str, Vec<&'static str>)> {
     transforms::methods()
 }
 

@@ -283,7 +283,7 @@ fn rust_name(function: Function) -> &'static str {
     }
 }
 
-/// Shaders have all functions under the names of C. A power of negative numbers is undefined, and sin, cos
+/// Shaders have these functions under the names of C. A power of negative numbers is undefined, and sin, cos
 /// and tan are of any accuracy: functions of the file itself stand for these, see `operations`.
 fn shader_call(function: Function, atan2: &str, operands: &[&str]) -> String {
     let operands = operands.join(", ");
@@ -293,7 +293,20 @@ fn shader_call(function: Function, atan2: &str, operands: &[&str]) -> String {
         Function::Unary(UnaryFunction::Acos) => return format!("(1.5707964 - asin({operands}))"),
         // log10 e, to the digits of an f32
         Function::Unary(UnaryFunction::Log10) => return format!("(log({operands}) * 0.43429448)"),
-        other => c_name(other, Precision::F64),
+        Function::Unary(
+            UnaryFunction::Sin
+            | UnaryFunction::Cos
+            | UnaryFunction::Tan
+            | UnaryFunction::Asin
+            | UnaryFunction::Atan
+            | UnaryFunction::Exp
+            | UnaryFunction::Ln
+            | UnaryFunction::Log2
+            | UnaryFunction::Sinh
+            | UnaryFunction::Cosh
+            | UnaryFunction::Tanh,
+        )
+        | Function::Binary(BinaryFunction::Pow) => c_name(function, Precision::F64),
     };
     format!("{name}({operands})")
 }

@@ -2,7 +2,7 @@
 
 use crate::interval::Interval;
 use crate::ir::bounds::range::{Affine, RangeRule};
-use crate::ir::function::{BinaryFunction, UnaryFunction};
+use crate::ir::function::BinaryFunction;
 use crate::ir::graph::{Axis, Expr, Graph, Node};
 use crate::ir::op::{Binary, Unary};
 
@@ -92,13 +92,11 @@ impl Rule {
     /// Whether a node with this rule may be infinite where its operands are numbers, if nothing bounds its range:
     /// an operand is, or bounded operands overflow, or it has a pole.
     pub fn may_be_infinite(self, of: impl Fn(Node) -> Interval, infinite: impl Fn(Node) -> bool) -> bool {
-        let has_pole = matches!(
-            self,
-            Self::Plain(
-                Expr::Unary(Unary::Call(UnaryFunction::Ln | UnaryFunction::Log2 | UnaryFunction::Log10), _)
-                    | Expr::Binary(Binary::Call(BinaryFunction::Pow), ..)
-            )
-        );
+        let has_pole = match self {
+            Self::Plain(Expr::Unary(Unary::Call(function), _)) => function.has_pole(),
+            Self::Plain(Expr::Binary(Binary::Call(function), ..)) => function.has_pole(),
+            Self::Plain(_) | Self::Power { .. } | Self::Slab { .. } => false,
+        };
         let is_read = self.operands().next().is_none();
         let is_unbounded = |node| !of(node).is_bounded();
         has_pole || self.operands().any(infinite) || !is_read && !self.operands().any(is_unbounded)
@@ -127,11 +125,7 @@ impl Rule {
                 | Binary::MaxWeight
                 | Binary::Call(BinaryFunction::Pow | BinaryFunction::Atan2) => false,
             },
-            Self::Plain(Expr::Unary(Unary::Call(function), a)) => {
-                let is_wave =
-                    matches!(function, UnaryFunction::Sin | UnaryFunction::Cos | UnaryFunction::Tan);
-                is_wave && infinite(a)
-            }
+            Self::Plain(Expr::Unary(Unary::Call(function), a)) => function.fails_at_infinity() && infinite(a),
             Self::Plain(Expr::Lookup(_, at)) => at.into_iter().any(infinite),
             // (±e + q)·(±e + s): the sum of an infinite e and a number is infinite
             Self::Plain(_) | Self::Power { .. } | Self::Slab { .. } => false,

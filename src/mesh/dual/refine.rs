@@ -218,7 +218,8 @@ fn add_bulging(vertices: &Vertices, t: [u32; 3], tolerance: f64, edges: &mut Vec
             // a cap is no part of ω = 0
             (VertexKind::Cap, _) | (_, VertexKind::Cap) => false,
             // sheets that touch
-            _ => chord != DVec3::ZERO,
+            (VertexKind::Sharp, VertexKind::Smooth | VertexKind::Sharp)
+            | (VertexKind::Smooth, VertexKind::Sharp) => chord != DVec3::ZERO,
         };
         // half of all edges ascend, so a branch on that alone could not be predicted
         if may_bulge & (t[i] < t[j]) {
