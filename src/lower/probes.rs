@@ -5,16 +5,52 @@
 use glam::DVec3;
 
 use super::lowering::Lowering;
+use super::scene::declaration::{SceneKey, declare_keys, names};
 use super::scene::{AskedMean, Block, Measured, Probe};
 use crate::diagnostic::{Code, Diagnostic};
 use crate::geom::Aabb;
-use crate::quantity::{Bound, Dimension};
+use crate::quantity::Dimension;
 use crate::syntax::ast::{Entry, Expr, ExprKind};
 
 const MEASURED: [&str; 7] = ["height", "pressure", "velocity", "force", "flux", "energy", "audit"];
-pub(in crate::lower) const PROBE_KEYS: [&str; 11] =
-    ["height", "pressure", "velocity", "force", "flux", "energy", "audit", "about", "every", "from", "known"];
-pub(in crate::lower) const FLUX_KEYS: [&str; 2] = ["point", "normal"];
+
+declare_keys! {
+    /// Keys of a probe.
+    mod keys {
+        HEIGHT = "height", Other, Required,
+            "measures the height of the surface, or of dry ground, in m, above a place [x, y], in m";
+        PRESSURE = "pressure", Other, Required,
+            "measures the pressure, in Pa, at a place, in m";
+        VELOCITY = "velocity", Other, Required,
+            "measures the velocity, in m/s, at a place, in m";
+        FORCE = "force", Other, Required,
+            "measures the force on an obstacle, in N, and its torque, in N·m";
+        FLUX = "flux", Block(super::flux_keys::ALL), Required,
+            "the block for a plane: measures how much flows through it, in kg/s";
+        ENERGY = "energy", Other, Required,
+            "measures the energies of the fluid with this name, in J";
+        AUDIT = "audit", Other, Required,
+            "tells how far energy, volume and compression of the fluid with this name are off";
+        ABOUT = "about", Vector(Dimension::LENGTH), Is3([0.0, 0.0, 0.0]),
+            "the point about which the torque of a `force` is taken";
+        EVERY = "every", Number(Dimension::TIME, Bound::Positive), Text("that of the frames"),
+            "the simulated time between samples";
+        FROM = "from", Number(Dimension::TIME, Bound::NotNegative), Text("no mean"),
+            "asks for the mean of all samples from this time on, with its standard error";
+        KNOWN = "known", Measured, Text("nothing"),
+            "what the mean is to be: the run says how far off it is";
+    }
+}
+
+declare_keys! {
+    /// Keys of a flux.
+    mod flux_keys {
+        POINT = "point", Vector(Dimension::LENGTH), Required,
+            "a point of the plane";
+        NORMAL = "normal", Vector(Dimension::NONE), Required,
+            "the direction in which the flow counts as positive; of any length";
+    }
+}
 
 /// What the probes of a scene may refer to.
 pub(super) struct Surroundings<'a> {
@@ -44,11 +80,8 @@ impl<'a> Lowering<'a> {
                         .label(first.span, "the first"),
                 );
             }
-            let block = self.block(entries, "a probe", span, &PROBE_KEYS, &[]);
-            let every = match block.setting("every") {
-                None => Some(None),
-                Some(_) => self.number_key(&block, "every", Dimension::TIME, None, Bound::Positive).map(Some),
-            };
+            let block = self.block(entries, "a probe", span, keys::ALL, &[]);
+            let every = self.stated_number(&block, &keys::EVERY);
             let Some(measured) = self.measured(&block, around) else { continue };
             if let (Some(every), Some(mean)) = (every, self.mean(&block, measured, around.until)) {
                 probes.push(Probe { name: label.text.clone(), span: label.span, measured, every, mean });
@@ -59,12 +92,12 @@ impl<'a> Lowering<'a> {
 
     /// Reads `from` and `known`, which ask for a mean; the outer `None` is a mistake that was reported.
     fn mean(&mut self, block: &Block<'_>, measured: Measured, until: f64) -> Option<Option<AskedMean>> {
-        let start = block.setting("from").map(|(_, value)| value.span);
-        let known = block.setting("known");
+        let start = block.setting(keys::FROM.name).map(|(_, value)| value.span);
+        let known = block.setting(keys::KNOWN.name);
         if start.is_none() && known.is_none() {
             return Some(None);
         }
-        let from = self.number_key(block, "from", Dimension::TIME, Some(0.0), Bound::NotNegative);
+        let from = self.stated_number(block, &keys::FROM).map(|from| from.unwrap_or(0.0));
         let known = match known {
             Some((_, value)) => self.known(block, value, measured),
             None => Some(Vec::new()),
@@ -93,7 +126,7 @@ impl<'a> Lowering<'a> {
             Measured::Velocity(_) | Measured::Force { .. } => {
                 let is_force = matches!(measured, Measured::Force { .. });
                 let dimension = if is_force { Dimension::FORCE } else { Dimension::SPEED };
-                let known = self.vector_key(block, "known", dimension, DVec3::ZERO)?;
+                let known = self.vector_in(block, keys::KNOWN.name, dimension)??;
                 Some(known.to_array().into())
             }
             Measured::Energy | Measured::Audit => {
@@ -111,7 +144,7 @@ impl<'a> Lowering<'a> {
         let mut stated =
             block.entries.iter().map(Entry::key).filter(|key| MEASURED.contains(&key.text.as_str()));
         let Some(key) = stated.next() else {
-            if block.entries.iter().any(|entry| !PROBE_KEYS.contains(&entry.key().text.as_str())) {
+            if block.entries.iter().any(|entry| !names(keys::ALL).any(|key| key == entry.key().text)) {
                 return None; // the misspelt key, which was reported, may be the one that is missing
             }
             let message = format!("a probe needs one of {}", MEASURED.join(", "));
@@ -142,11 +175,11 @@ impl<'a> Lowering<'a> {
         let (_, value) = block.setting(&key.text)?; // a block in place of the value was reported
         match key.text.as_str() {
             "height" => self.place_on_ground(value, domain).map(Measured::Height),
-            "pressure" => self.place(block, "pressure", domain).map(Measured::Pressure),
-            "velocity" => self.place(block, "velocity", domain).map(Measured::Velocity),
+            "pressure" => self.place(block, &keys::PRESSURE, domain).map(Measured::Pressure),
+            "velocity" => self.place(block, &keys::VELOCITY, domain).map(Measured::Velocity),
             "force" => {
                 let body = self.one_of(value, "force", &around.bodies, "obstacle of this scene");
-                let about = self.vector_key(block, "about", Dimension::LENGTH, DVec3::ZERO);
+                let about = self.vector_key(block, &keys::ABOUT);
                 Some(Measured::Force { body: body?, about: about? })
             }
             "audit" => {
@@ -160,15 +193,15 @@ impl<'a> Lowering<'a> {
 
     fn flux(&mut self, block: &Block<'_>, domain: &Aabb) -> Option<Measured> {
         let (_, entries, span) = block.blocks("flux").next()?;
-        let block = self.block(entries, "a flux", span, &FLUX_KEYS, &[]);
+        let block = self.block(entries, "a flux", span, flux_keys::ALL, &[]);
         for (key, help) in [("point", "write `point: [1, 0, 0]`"), ("normal", "write `normal: [1, 0, 0]`")] {
             if block.setting(key).is_none() {
                 self.missing(&block, key, help);
                 return None;
             }
         }
-        let point = self.place(&block, "point", domain);
-        let normal = self.vector_key(&block, "normal", Dimension::NONE, DVec3::X)?;
+        let point = self.place(&block, &flux_keys::POINT, domain);
+        let normal = self.vector_key(&block, &flux_keys::NORMAL)?;
         let Some(unit) = normal.try_normalize() else {
             let at = block.setting("normal").map_or(span, |(_, value)| value.span);
             let message = format!("`normal` must have a length, found {normal}");
@@ -179,9 +212,9 @@ impl<'a> Lowering<'a> {
     }
 
     /// Reads a place, which must lie in the box.
-    fn place(&mut self, block: &Block<'_>, key: &'static str, domain: &Aabb) -> Option<DVec3> {
-        let at = self.vector_key(block, key, Dimension::LENGTH, DVec3::ZERO)?;
-        let (_, value) = block.setting(key)?;
+    fn place(&mut self, block: &Block<'_>, key: &SceneKey, domain: &Aabb) -> Option<DVec3> {
+        let at = self.vector_in(block, key.name, Dimension::LENGTH)??;
+        let (_, value) = block.setting(key.name)?;
         self.within(domain.contains(at), value, format!("{at}"), domain).then_some(at)
     }
 

@@ -1,9 +1,12 @@
 //! The words that a file may use at each place, for editors.
 
+pub use super::scene::declaration::{KeyValue, SceneKey, Without};
+
 use super::names::RESERVED;
-use super::scene::{fluid, picture, read};
-use super::{builtins, probes, transforms};
-use crate::sph::{KeyBlock, Method};
+use super::scene::declaration::names;
+use super::scene::read;
+use super::{builtins, transforms};
+use crate::sph::Method;
 use crate::syntax::Ast;
 
 /// The standard solids and maps, as they are written in the language.
@@ -26,25 +29,31 @@ pub fn reserved() -> &'static [&'static str] {
     &RESERVED
 }
 
-/// The keys of a block of a scene with a method, or of the scene itself.
+/// All blocks with the keys that every method has, a block before those within it; `None` is the scene itself.
+pub fn blocks() -> Vec<(Option<&'static str>, &'static [SceneKey])> {
+    fn add(
+        name: Option<&'static str>,
+        keys: &'static [SceneKey],
+        blocks: &mut Vec<(Option<&'static str>, &'static [SceneKey])>,
+    ) {
+        blocks.push((name, keys));
+        for key in keys {
+            if let Some(inner) = key.block() {
+                add(Some(key.name), inner, blocks);
+            }
+        }
+    }
+    let mut blocks = Vec::new();
+    add(None, read::scene_keys::ALL, &mut blocks);
+    blocks
+}
+
+/// The keys of a block of a scene with a method, or of the scene itself; none if there is no such block.
 pub fn keys(block: Option<&str>, method: Method) -> Vec<&'static str> {
-    let own = |block: KeyBlock| {
-        method.info().keys.into_iter().filter(move |key| key.block == block).map(|key| key.name)
-    };
-    let mut keys: Vec<&'static str> = match block {
-        None => read::SCENE_KEYS.to_vec(),
-        Some("box") => read::BOX_KEYS.to_vec(),
-        Some("container" | "obstacle") => read::OBSTACLE_KEYS.to_vec(),
-        Some("fluid") => fluid::FLUID_KEYS.iter().copied().chain(own(KeyBlock::Fluid)).collect(),
-        Some("solver") => fluid::SOLVER_KEYS.iter().copied().chain(own(KeyBlock::Solver)).collect(),
-        Some("run") => read::RUN_KEYS.to_vec(),
-        Some("truth") => read::TRUTH_KEYS.to_vec(),
-        Some("probe") => probes::PROBE_KEYS.to_vec(),
-        Some("flux") => probes::FLUX_KEYS.to_vec(),
-        Some("picture") => picture::PICTURE_KEYS.to_vec(),
-        // there is no other block
-        Some(_) => Vec::new(),
-    };
+    let declared = blocks().into_iter().find(|(name, _)| *name == block);
+    let own = method.info().keys.into_iter().filter(|key| Some(key.block.name()) == block);
+    let shared = declared.into_iter().flat_map(|(_, keys)| names(keys));
+    let mut keys: Vec<&'static str> = shared.chain(own.map(|key| key.name)).collect();
     let mut known = std::collections::HashSet::new();
     keys.retain(|key| known.insert(*key));
     keys
@@ -63,13 +72,10 @@ pub fn is_key(name: &str) -> bool {
 
 /// The words that a key takes as its value; none if it takes a number, a name or an expression.
 pub fn words(key: &str) -> Vec<String> {
-    let fixed = |words: &[&str]| words.iter().map(ToString::to_string).collect();
-    match key {
-        "method" => Method::all().iter().map(|method| method.name().to_string()).collect(),
-        "fill" => fixed(&["below", "middle"]),
-        "walls" => fixed(&["free_slip", "no_slip"]),
-        "precision" => fixed(&["auto", "f32", "f64"]),
-        "cut" => fixed(&["auto", "none"]),
+    let declared = blocks().into_iter().flat_map(|(_, keys)| keys).find(|declared| declared.name == key);
+    match declared.map(|key| key.value) {
+        Some(KeyValue::MethodName) => Method::all().iter().map(|method| method.name().to_string()).collect(),
+        Some(KeyValue::Words(words)) => words.iter().map(ToString::to_string).collect(),
         _ => {
             let keys = Method::all().into_iter().flat_map(|method| method.info().keys);
             let accepts = keys.filter(|own| own.name == key && own.unit.is_none()).map(|own| own.accepts);

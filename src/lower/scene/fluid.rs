@@ -2,6 +2,7 @@
 //! declares.
 
 use super::super::lowering::Lowering;
+use super::declaration::{SceneKey, declare_keys, names as key_names};
 use super::{Block, Fluid, Solver};
 use crate::diagnostic::{Code, Diagnostic, Span};
 use crate::ir::Node;
@@ -10,24 +11,43 @@ use crate::quantity::{Bound, Dimension};
 use crate::sph::{Fill, KeyBlock, KeyReader, Method};
 use crate::syntax::ast::Entry;
 
-/// Keys of a fluid that every method has.
-pub(in crate::lower) const FLUID_KEYS: [&str; 12] = [
-    "shape",
-    "fill",
-    "particles",
-    "density",
-    "mass",
-    "spacing",
-    "viscosity",
-    "surface_tension",
-    "support_radius",
-    "velocity",
-    "jitter",
-    "seed",
-];
+declare_keys! {
+    /// Keys of a fluid that every method has.
+    mod keys {
+        SHAPE = "shape", Other, Required,
+            "where the fluid is at the start: a solid";
+        FILL = "fill", Words(&["below", "middle"]), Text("below"),
+            "which part of the shape is filled where there are fewer particles than fit: from below, or the middle";
+        PARTICLES = "particles", Count(1), Text("as the method says, or as many as fill the shape"),
+            "the number of particles";
+        DENSITY = "density", Number(Dimension::DENSITY, Bound::Positive), Is(998.29),
+            "the density at rest";
+        MASS = "mass", Number(Dimension::MASS, Bound::Positive), Is(0.02),
+            "the mass of a particle, unless `spacing` stands in its place";
+        SPACING = "spacing", Number(Dimension::LENGTH, Bound::Positive), Text("from the mass"),
+            "the distance of neighbouring particles, from which their mass follows";
+        VISCOSITY = "viscosity", Number(Dimension::VISCOSITY, Bound::NotNegative), Text("that of the method"),
+            "the dynamic viscosity";
+        SURFACE_TENSION = "surface_tension", Number(Dimension::TENSION, Bound::NotNegative), Text("that of the method"),
+            "the surface tension";
+        SUPPORT_RADIUS = "support_radius", Number(Dimension::LENGTH, Bound::Positive), Text("that of the method"),
+            "how far a particle feels others: the support of the kernel";
+        VELOCITY = "velocity", Formulas(Dimension::SPEED), Is3([0.0, 0.0, 0.0]),
+            "the velocity at the start; may depend on x, y and z";
+        JITTER = "jitter", Number(Dimension::NONE, Bound::Fraction), Is(0.0),
+            "random displacement of the places at the start, as a part of the spacing, 0 … 1";
+        SEED = "seed", Count(0), Is(1.0),
+            "the seed of that displacement: a whole number";
+    }
+}
 
-/// Keys of a solver that every method has.
-pub(in crate::lower) const SOLVER_KEYS: [&str; 1] = ["precision"];
+declare_keys! {
+    /// Keys of a solver that every method has.
+    mod solver_keys {
+        PRECISION = "precision", Words(&["auto", "f32", "f64"]), Text("auto, that of the method"),
+            "the precision of the sums over neighbours";
+    }
+}
 
 /// What a scene states about its fluid and method.
 pub(super) struct FluidAndMethod {
@@ -48,19 +68,17 @@ impl<'a> Lowering<'a> {
     /// Reads `method`, `fluid` and `solver` of a scene.
     pub(super) fn fluid_and_method(&mut self, scene: &Block<'a>) -> Option<FluidAndMethod> {
         let all = Method::all();
-        let words: Vec<(&str, Method)> = all.iter().map(|method| (method.name(), *method)).collect();
-        let stated = self.word_key(scene, "method", &words);
+        let names: Vec<&str> = all.iter().map(Method::name).collect();
+        let stated = self.one_word(scene, "method", &names);
+        let stated = stated.map(|stated| stated.map_or_else(Method::default, |index| all[index]));
         let fluid = self.fluid_block(scene, stated);
         let solver = self.solver_block(scene, stated);
         // a method that replaces the stated one reads the keys that both of them have
         let mut method = self.method.or(stated).unwrap_or_default();
         let before = self.errors();
         method.read(&mut MethodKeys { lowering: self, fluid: fluid.as_ref(), solver: &solver });
-        let precision = self.word_key(
-            &solver,
-            "precision",
-            &[("auto", None), ("f32", Some(Precision::F32)), ("f64", Some(Precision::F64))],
-        );
+        let precisions = [None, Some(Precision::F32), Some(Precision::F64)];
+        let precision = self.word_key(&solver, &solver_keys::PRECISION, &precisions, None);
         let fluid = self.fluid(&fluid?, &method);
         let ok = self.errors() == before;
         Some(FluidAndMethod {
@@ -84,8 +102,8 @@ impl<'a> Lowering<'a> {
                 Diagnostic::error(Code::SCENE_REPEATED, second, message).label(span, "the first fluid"),
             );
         }
-        let known = self.keys_of(method, KeyBlock::Fluid, &FLUID_KEYS, entries);
-        let mut block = self.block(entries, "a fluid", span, &known, &[]);
+        let known = self.keys_of(method, KeyBlock::Fluid, keys::ALL, entries);
+        let mut block = self.block_with(entries, "a fluid", span, (keys::ALL, &known), &[]);
         block.label = label;
         Some(block)
     }
@@ -94,8 +112,8 @@ impl<'a> Lowering<'a> {
     fn solver_block(&mut self, scene: &Block<'a>, method: Option<Method>) -> Block<'a> {
         let (entries, span) =
             scene.blocks("solver").next().map_or((&[][..], scene.span), |(_, entries, span)| (entries, span));
-        let known = self.keys_of(method, KeyBlock::Solver, &SOLVER_KEYS, entries);
-        self.block(entries, "a solver", span, &known, &[])
+        let known = self.keys_of(method, KeyBlock::Solver, solver_keys::ALL, entries);
+        self.block_with(entries, "a solver", span, (solver_keys::ALL, &known), &[])
     }
 
     /// The known keys of a block: those of every method and those of this one. A key that only other methods
@@ -104,7 +122,7 @@ impl<'a> Lowering<'a> {
         &mut self,
         method: Option<Method>,
         block: KeyBlock,
-        of_every_method: &[&'static str],
+        of_every_method: &[SceneKey],
         entries: &[Entry],
     ) -> Vec<&'static str> {
         let own = |method: Method| method.info().keys.into_iter().filter(|key| key.block == block);
@@ -112,9 +130,9 @@ impl<'a> Lowering<'a> {
         let Some(method) = method else {
             // the method is unknown, so the keys of all methods are accepted
             let all = Method::all().into_iter().flat_map(names);
-            return of_every_method.iter().copied().chain(all).collect();
+            return key_names(of_every_method).chain(all).collect();
         };
-        let known: Vec<&'static str> = of_every_method.iter().copied().chain(names(method)).collect();
+        let known: Vec<&'static str> = key_names(of_every_method).chain(names(method)).collect();
         for entry in entries {
             let key = entry.key();
             let methods = Method::with_key(block, &key.text);
@@ -136,27 +154,30 @@ impl<'a> Lowering<'a> {
 
     fn fluid(&mut self, block: &Block<'a>, method: &Method) -> Option<Fluid> {
         let defaults = method.fluid();
-        let shape = match block.setting("shape") {
+        let shape = match block.setting(keys::SHAPE.name) {
             Some((_, value)) => self.shape(value).map(|node| {
                 self.warn_of_constant("the fluid's shape", node, value);
                 (node, value.span)
             }),
             None => {
-                self.missing(block, "shape", "write `shape: ball([1.5, 1.5, 2], 0.4)` or any other solid");
+                self.missing(
+                    block,
+                    keys::SHAPE.name,
+                    "write `shape: ball([1.5, 1.5, 2], 0.4)` or any other solid",
+                );
                 None
             }
         };
-        let fill = self.word_key(block, "fill", &[("below", Fill::Below), ("middle", Fill::Middle)]);
+        let fill = self.word_key(block, &keys::FILL, &[Fill::Below, Fill::Middle], Fill::Below);
         let resolution = self.resolution(block);
         let mut number =
-            |key, dimension, default, bound| self.number_key(block, key, dimension, Some(default), bound);
-        let viscosity = number("viscosity", Dimension::VISCOSITY, defaults.viscosity, Bound::NotNegative);
-        let tension =
-            number("surface_tension", Dimension::TENSION, defaults.surface_tension, Bound::NotNegative);
-        let jitter = number("jitter", Dimension::NONE, 0.0, Bound::Fraction);
+            |key, default| self.stated_number(block, key).map(|stated| stated.unwrap_or(default));
+        let viscosity = number(&keys::VISCOSITY, defaults.viscosity);
+        let tension = number(&keys::SURFACE_TENSION, defaults.surface_tension);
+        let jitter = self.number_key(block, &keys::JITTER);
         let velocity = self.velocity(block);
-        let particles = self.count_key(block, "particles", 1);
-        let seed = self.count_key(block, "seed", 0);
+        let particles = self.count_key(block, &keys::PARTICLES);
+        let seed = self.count_key(block, &keys::SEED);
         let (shape, shape_span) = shape?;
         let Resolution { density, mass, size_span, support_radius } = resolution?;
         let particles = particles?.or(defaults.particles.filter(|_| size_span.is_none()));
@@ -167,28 +188,26 @@ impl<'a> Lowering<'a> {
             shape_span,
             fill: fill?,
             particles,
-            particles_span: block.setting("particles").map(|(_, value)| value.span),
+            particles_span: block.setting(keys::PARTICLES.name).map(|(_, value)| value.span),
             density,
             mass,
             size_span,
             viscosity: viscosity?,
             surface_tension: tension?,
-            tension_span: block.setting("surface_tension").map(|(_, value)| value.span),
+            tension_span: block.setting(keys::SURFACE_TENSION.name).map(|(_, value)| value.span),
             support_radius,
             velocity: velocity?,
             jitter: jitter?,
-            seed: seed?.unwrap_or(1) as u64,
+            seed: seed?? as u64,
         })
     }
 
     /// Reads density, mass and support radius of the particles. A spacing may replace the mass.
     fn resolution(&mut self, block: &Block<'_>) -> Option<Resolution> {
-        let mut number =
-            |key, dimension, default| self.number_key(block, key, dimension, Some(default), Bound::Positive);
-        let density = number("density", Dimension::DENSITY, 998.29);
-        let mass = number("mass", Dimension::MASS, 0.02);
-        let spacing = number("spacing", Dimension::LENGTH, 0.02);
-        let both = (block.setting("mass"), block.setting("spacing"));
+        let density = self.number_key(block, &keys::DENSITY);
+        let mass = self.number_key(block, &keys::MASS);
+        let spacing = self.stated_number(block, &keys::SPACING);
+        let both = (block.setting(keys::MASS.name), block.setting(keys::SPACING.name));
         if let (Some((first, _)), Some((second, _))) = both {
             let message = "`mass` and `spacing` say the same: the mass of a particle is density·spacing³";
             self.report(
@@ -197,21 +216,16 @@ impl<'a> Lowering<'a> {
             );
         }
         let (mass, density) = (mass?, density?);
-        let mass = if both.1.is_some() { density * spacing?.powi(3) } else { mass };
-        let support_radius = match block.setting("support_radius") {
-            Some(_) => {
-                Some(self.number_key(block, "support_radius", Dimension::LENGTH, None, Bound::Positive)?)
-            }
-            None => None,
-        };
+        let mass = spacing?.map_or(mass, |spacing| density * spacing.powi(3));
+        let support_radius = self.stated_number(block, &keys::SUPPORT_RADIUS)?;
         let size_span = both.1.or(both.0).map(|(_, value)| value.span);
         Some(Resolution { density, mass, size_span, support_radius })
     }
 
     /// Reads the velocity at the start, which may depend on the place.
     fn velocity(&mut self, block: &Block<'_>) -> Option<[Node; 3]> {
-        match block.setting("velocity") {
-            Some((_, value)) => self.components(value, Dimension::SPEED, "velocity"),
+        match block.setting(keys::VELOCITY.name) {
+            Some((_, value)) => self.components(value, &keys::VELOCITY),
             None => Some([self.module.graph.constant(0.0); 3]),
         }
     }
@@ -245,19 +259,17 @@ impl KeyReader for MethodKeys<'_, '_> {
         bound: Bound,
     ) -> Option<f64> {
         let block = self.stating(block, key)?;
-        self.lowering.number_key(block, key, dimension, None, bound)
+        self.lowering.number_in(block, key, dimension, bound)?
     }
 
     fn count(&mut self, block: KeyBlock, key: &'static str, least: u32) -> Option<u32> {
         let block = self.stating(block, key)?;
-        let count = self.lowering.count_key(block, key, least)??;
+        let count = self.lowering.count_in(block, key, least)??;
         u32::try_from(count).ok()
     }
 
     fn word(&mut self, block: KeyBlock, key: &'static str, words: &[&'static str]) -> Option<usize> {
         let block = self.stating(block, key)?;
-        let words: Vec<(&str, usize)> =
-            words.iter().enumerate().map(|(index, word)| (*word, index)).collect();
-        self.lowering.word_key(block, key, &words)
+        self.lowering.one_word(block, key, words)?
     }
 }

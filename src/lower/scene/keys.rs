@@ -4,16 +4,13 @@ use glam::DVec3;
 
 use super::super::lowering::Lowering;
 use super::super::value::Value;
+use super::declaration::{KeyValue, SceneKey, names};
 use crate::diagnostic::{Code, Diagnostic, Span};
 use crate::ir::Node;
 use crate::quantity::{Bound, Dimension, parse_unit};
 use crate::sph::{KeyBlock, Method};
 use crate::syntax::ast::{Entry, Expr, ExprKind, Name};
 use crate::syntax::foreign;
-
-/// Keys that open a block; all others have a value.
-const BLOCKS: [&str; 10] =
-    ["box", "container", "fluid", "obstacle", "solver", "run", "truth", "probe", "flux", "picture"];
 
 /// Keys that are often looked for one block too far out.
 const INNER: [(&str, &[&str]); 4] = [
@@ -93,9 +90,24 @@ impl<'a> Lowering<'a> {
         entries: &'b [Entry],
         what: &'static str,
         span: Span,
-        known: &[&'static str],
+        keys: &[SceneKey],
         repeatable: &[&str],
     ) -> Block<'b> {
+        let known: Vec<&'static str> = names(keys).collect();
+        self.block_with(entries, what, span, (keys, &known), repeatable)
+    }
+
+    /// [`Lowering::block`] with names that are known besides those of the declared keys.
+    pub(super) fn block_with<'b>(
+        &mut self,
+        entries: &'b [Entry],
+        what: &'static str,
+        span: Span,
+        (declared, known): (&[SceneKey], &[&'static str]),
+        repeatable: &[&str],
+    ) -> Block<'b> {
+        let opens_block =
+            |key: &str| declared.iter().any(|known| known.name == key && known.block().is_some());
         for (i, entry) in entries.iter().enumerate() {
             let key = entry.key();
             if !known.contains(&key.text.as_str()) {
@@ -131,7 +143,7 @@ impl<'a> Lowering<'a> {
                         None => diagnostic,
                     },
                 });
-            } else if matches!(entry, Entry::Block { .. }) != BLOCKS.contains(&key.text.as_str()) {
+            } else if matches!(entry, Entry::Block { .. }) != opens_block(&key.text) {
                 let (is, form) = match entry {
                     Entry::Block { .. } => ("has a value", format!("{}: …", key.text)),
                     Entry::Setting { value, .. } => ("is a block", block_form(&key.text, value)),
@@ -154,7 +166,8 @@ impl<'a> Lowering<'a> {
     }
 
     /// Reads the components of a vector, each a formula or a quantity.
-    pub(super) fn components(&mut self, value: &Expr, dimension: Dimension, key: &str) -> Option<[Node; 3]> {
+    pub(super) fn components(&mut self, value: &Expr, key: &SceneKey) -> Option<[Node; 3]> {
+        let (dimension, key) = (key.dimension(), key.name);
         let parts = match &value.kind {
             ExprKind::Vector(parts) if parts.len() == 3 => parts,
             _ => {
@@ -197,59 +210,93 @@ impl<'a> Lowering<'a> {
         None
     }
 
-    /// Reads one of a few words. The first is the default; `None` if the word is unknown, which is reported.
+    /// Reads one of the words of a key, which have these meanings; `None` if the word is unknown, which is reported.
     pub(super) fn word_key<T: Copy>(
         &mut self,
         block: &Block<'_>,
-        key: &str,
-        words: &[(&str, T)],
+        key: &SceneKey,
+        meanings: &[T],
+        default: T,
     ) -> Option<T> {
-        let Some((_, value)) = block.setting(key) else { return words.first().map(|(_, meaning)| *meaning) };
+        match self.one_word(block, key.name, key.words())? {
+            Some(index) => meanings.get(index).copied(),
+            None => Some(default),
+        }
+    }
+
+    /// Reads one of a few words, and returns its index. The outer option is `None` if the word is unknown, which is
+    /// reported; the inner one if the key is absent.
+    pub(super) fn one_word(&mut self, block: &Block<'_>, key: &str, words: &[&str]) -> Option<Option<usize>> {
+        let Some((_, value)) = block.setting(key) else { return Some(None) };
         let found = match &value.kind {
             ExprKind::Name(word) | ExprKind::Text(word) => word.as_str(),
             _ => "",
         };
-        let meaning = words.iter().find(|(word, _)| *word == found).map(|(_, meaning)| *meaning);
-        if meaning.is_none() {
-            let known: Vec<&str> = words.iter().map(|(word, _)| *word).collect();
+        let index = words.iter().position(|word| *word == found);
+        if index.is_none() {
             let diagnostic =
                 Diagnostic::error(Code::SCENE_KEY, value.span, format!("unknown value of `{key}`"))
-                    .help(format!("this version knows {}", known.join(", ")))
-                    .suggest(found, known);
+                    .help(format!("this version knows {}", words.join(", ")))
+                    .suggest(found, words.iter().copied());
             self.report(diagnostic);
         }
-        meaning
+        index.map(Some)
     }
 
-    /// Reads a number and checks its unit and bound; `None` if it is wrong, which is reported. A key without
-    /// a default must be present.
-    pub(in crate::lower) fn number_key(
+    /// Reads a number of a key that must be present or has a number without it; `None` if the number is absent, or wrong,
+    /// which is reported.
+    pub(in crate::lower) fn number_key(&mut self, block: &Block<'_>, key: &SceneKey) -> Option<f64> {
+        self.stated_number(block, key)?.or(key.number_without())
+    }
+
+    /// Reads a number, and checks its unit and bound. The outer option is `None` if it is wrong, which is reported; the
+    /// inner one if the key is absent.
+    pub(in crate::lower) fn stated_number(
+        &mut self,
+        block: &Block<'_>,
+        key: &SceneKey,
+    ) -> Option<Option<f64>> {
+        self.number_in(block, key.name, key.dimension(), key.bound()?)
+    }
+
+    /// [`Lowering::stated_number`] of a key that is declared elsewhere.
+    pub(super) fn number_in(
         &mut self,
         block: &Block<'_>,
         key: &str,
         dimension: Dimension,
-        default: Option<f64>,
         bound: Bound,
-    ) -> Option<f64> {
-        let Some((_, value)) = block.setting(key) else { return default };
+    ) -> Option<Option<f64>> {
+        let Some((_, value)) = block.setting(key) else { return Some(None) };
         let number = self.quantity_expr(value, dimension, key)?;
         if bound.admits(number) {
-            return Some(number);
+            return Some(Some(number));
         }
         let message = format!("`{key}` {}, found {number}", bound.demand());
         self.report(Diagnostic::error(Code::OUT_OF_RANGE, value.span, message));
         None
     }
 
-    /// Reads a vector of finite numbers with a unit; `None` if it is wrong, which is reported.
-    pub(in crate::lower) fn vector_key(
+    /// Reads a vector of a key that must be present or has a vector without it; `None` if the vector is absent, or wrong,
+    /// which is reported.
+    pub(in crate::lower) fn vector_key(&mut self, block: &Block<'_>, key: &SceneKey) -> Option<DVec3> {
+        self.stated_vector(block, key)?.or(key.vector_without())
+    }
+
+    /// Reads a vector of finite numbers with a unit. The outer option is `None` if it is wrong, which is reported; the
+    /// inner one if the key is absent.
+    pub(super) fn stated_vector(&mut self, block: &Block<'_>, key: &SceneKey) -> Option<Option<DVec3>> {
+        self.vector_in(block, key.name, key.dimension())
+    }
+
+    /// [`Lowering::stated_vector`] of a key whose dimension depends on others.
+    pub(in crate::lower) fn vector_in(
         &mut self,
         block: &Block<'_>,
         key: &str,
         dimension: Dimension,
-        default: DVec3,
-    ) -> Option<DVec3> {
-        let Some((_, value)) = block.setting(key) else { return Some(default) };
+    ) -> Option<Option<DVec3>> {
+        let Some((_, value)) = block.setting(key) else { return Some(None) };
         let vector = if let ExprKind::Vector(parts) = &value.kind
             && let [a, b, c] = &parts[..]
         {
@@ -261,16 +308,24 @@ impl<'a> Lowering<'a> {
             DVec3::from_array(self.constant_vector(&found, value.span, &format!("`{key}`"))?)
         };
         if vector.is_finite() {
-            return Some(vector);
+            return Some(Some(vector));
         }
         let message = format!("`{key}` must be finite, found {vector}");
         self.report(Diagnostic::error(Code::OUT_OF_RANGE, value.span, message));
         None
     }
 
+    /// Reads the whole number of a key. The outer option is `None` if the number is wrong, which is reported; the inner
+    /// one if the key is absent and has no number without it.
+    pub(super) fn count_key(&mut self, block: &Block<'_>, key: &SceneKey) -> Option<Option<usize>> {
+        let KeyValue::Count(least) = key.value else { return None };
+        let stated = self.count_in(block, key.name, least)?;
+        Some(stated.or(key.number_without().map(|number| number as usize)))
+    }
+
     /// Reads a whole number of at least `least`. The outer option is `None` if the number is wrong, which is
     /// reported; the inner one if the key is absent.
-    pub(super) fn count_key(&mut self, block: &Block<'_>, key: &str, least: u32) -> Option<Option<usize>> {
+    pub(super) fn count_in(&mut self, block: &Block<'_>, key: &str, least: u32) -> Option<Option<usize>> {
         const MOST: f64 = 1e9;
         let Some((_, value)) = block.setting(key) else { return Some(None) };
         let number = self.quantity_expr(value, Dimension::NONE, key)?;

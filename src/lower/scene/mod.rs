@@ -2,13 +2,17 @@
 //!
 //! Invariant: after this stage every number is finite and in SI units, and every size is positive.
 //!
-//! This file has the data, [`read`] reads the blocks of a scene, [`fluid`] its fluid and method, [`picture`] how it is
-//! drawn, and [`keys`] what a key may hold.
+//! This file has the data, [`read`] reads the blocks of a scene, [`fluid`] its fluid and method, [`run`] how long it
+//! runs, [`truth`] what is known of it, [`picture`] how it is drawn, and [`keys`] what a key may hold. The keys of a
+//! block are declared beside their reader, see [`declaration`].
 
+pub(super) mod declaration;
 pub(super) mod fluid;
 mod keys;
 pub(super) mod picture;
 pub(super) mod read;
+pub(super) mod run;
+pub(super) mod truth;
 
 use glam::DVec3;
 

@@ -3,15 +3,33 @@
 use glam::DVec3;
 
 use super::super::lowering::Lowering;
+use super::declaration::declare_keys;
 use super::{Block, Opening, Picture};
 use crate::diagnostic::{Code, Diagnostic};
 use crate::quantity::Dimension;
 use crate::syntax::ast::{Comparison, Expr, ExprKind};
 
-pub(in crate::lower) const PICTURE_KEYS: [&str; 6] = ["camera", "look_at", "zoom", "cut", "hide", "glass"];
 const AXES: [&str; 3] = ["x", "y", "z"];
 const CUT_HELP: &str =
     "write `cut: y <= 0.5` for the part of the obstacles that is taken away, `cut: auto` or `cut: none`";
+
+declare_keys! {
+    /// Keys of a picture.
+    mod keys {
+        CAMERA = "camera", Vector(Dimension::NONE), Text("from the front, right and above"),
+            "the direction from the scene to the eye, of any length";
+        LOOK_AT = "look_at", Vector(Dimension::LENGTH), Text("the middle of the box"),
+            "the place in the middle of the picture";
+        ZOOM = "zoom", Number(Dimension::NONE, Bound::Positive), Is(1.0),
+            "how many times as large as if the whole box were seen, 0.05 … 20";
+        CUT = "cut", Words(&["auto", "none"]), Text("auto"),
+            "the part of the obstacles that is taken away: `y <= 0.5`, `auto` or `none`";
+        HIDE = "hide", Other, Text("none"),
+            "obstacles that are not drawn, by their names";
+        GLASS = "glass", Other, Text("none"),
+            "obstacles that are drawn clear, by their names";
+    }
+}
 
 impl<'a> Lowering<'a> {
     /// Reads the block `picture` of a scene with these bodies.
@@ -19,19 +37,16 @@ impl<'a> Lowering<'a> {
         let Some((_, entries, span)) = scene.blocks("picture").next() else {
             return Some(Picture::default());
         };
-        let block = self.block(entries, "a picture", span, &PICTURE_KEYS, &[]);
+        let block = self.block(entries, "a picture", span, keys::ALL, &[]);
         let camera = self.camera(&block)?;
-        let look_at = match block.setting("look_at") {
-            Some(_) => Some(self.vector_key(&block, "look_at", Dimension::LENGTH, DVec3::ZERO)?),
-            None => None,
-        };
+        let look_at = self.stated_vector(&block, &keys::LOOK_AT)?;
         let zoom = self.zoom(&block)?;
-        let cut = match block.setting("cut") {
+        let cut = match block.setting(keys::CUT.name) {
             Some((_, value)) => self.opening(value)?,
             None => Opening::default(),
         };
-        let hide = self.obstacles(&block, "hide", bodies)?;
-        let glass = self.obstacles(&block, "glass", bodies)?;
+        let hide = self.obstacles(&block, keys::HIDE.name, bodies)?;
+        let glass = self.obstacles(&block, keys::GLASS.name, bodies)?;
         Some(Picture { camera, look_at, zoom, cut, hide, glass })
     }
 
@@ -52,14 +67,14 @@ impl<'a> Lowering<'a> {
     /// Reads the direction to the eye. The outer option is `None` if it is wrong, which is reported; the
     /// inner one if it is not stated.
     fn camera(&mut self, block: &Block<'_>) -> Option<Option<DVec3>> {
-        let Some((_, value)) = block.setting("camera") else { return Some(None) };
+        let Some((_, value)) = block.setting(keys::CAMERA.name) else { return Some(None) };
         let help = "it is the direction from the scene to the eye: write `camera: [0, -1, 0.5]`";
         if let ExprKind::Number(_) | ExprKind::Quantity { .. } = value.kind {
             let message = "`camera` is a vector `[x, y, z]`, found a number";
             self.report(Diagnostic::error(Code::WRONG_TYPE, value.span, message).help(help));
             return None;
         }
-        let camera = self.vector_key(block, "camera", Dimension::NONE, DVec3::ZERO)?;
+        let camera = self.vector_key(block, &keys::CAMERA)?;
         if camera == DVec3::ZERO {
             let message = "`camera` must have a length, found [0, 0, 0]";
             self.report(Diagnostic::error(Code::OUT_OF_RANGE, value.span, message).help(help));
@@ -71,8 +86,8 @@ impl<'a> Lowering<'a> {
     /// Reads how large the picture is. The outer option is `None` if it is wrong, which is reported; the
     /// inner one if it is not stated.
     fn zoom(&mut self, block: &Block<'_>) -> Option<Option<f64>> {
-        let Some((_, value)) = block.setting("zoom") else { return Some(None) };
-        let zoom = self.quantity_expr(value, Dimension::NONE, "zoom")?;
+        let Some((_, value)) = block.setting(keys::ZOOM.name) else { return Some(None) };
+        let zoom = self.quantity_expr(value, Dimension::NONE, keys::ZOOM.name)?;
         if Picture::ZOOMS.contains(&zoom) {
             return Some(Some(zoom));
         }
@@ -97,7 +112,7 @@ impl<'a> Lowering<'a> {
                         (None, Some(axis)) => (axis, &**first, !less),
                         (Some(_), Some(_)) | (None, None) => return self.no_opening(value),
                     };
-                    let at = self.quantity_expr(number, Dimension::LENGTH, "cut")?;
+                    let at = self.quantity_expr(number, Dimension::LENGTH, keys::CUT.name)?;
                     return if at.is_finite() {
                         Some(Opening::Half { axis, at, below })
                     } else {

@@ -4,38 +4,83 @@ use glam::DVec3;
 
 use super::super::lowering::Lowering;
 use super::super::probes::Surroundings;
+use super::declaration::{SceneKey, declare_keys, names};
 use super::fluid::FluidAndMethod;
-use super::{Block, Bounce, Container, Gravity, Obstacle, Run, Scene, Skin, Tolerance, Truth};
+use super::{Block, Bounce, Container, Gravity, Obstacle, Run, Scene, Skin, Tolerance};
 use crate::diagnostic::{Code, Diagnostic, Span};
 use crate::geom::Aabb;
 use crate::ir::Unary;
-use crate::quantity::{Bound, Dimension};
+use crate::quantity::Dimension;
 use crate::sph::Slip;
 use crate::syntax::ast::{self, Entry, Expr, ExprKind};
 
-pub(in crate::lower) const SCENE_KEYS: [&str; 14] = [
-    "units",
-    "box",
-    "container",
-    "fluid",
-    "obstacle",
-    "gravity",
-    "walls",
-    "method",
-    "solver",
-    "run",
-    "truth",
-    "probe",
-    "picture",
-    "tolerance",
-];
-pub(in crate::lower) const TRUTH_KEYS: [&str; 4] = ["pressure", "velocity", "front", "from"];
-pub(in crate::lower) const BOX_KEYS: [&str; 4] = ["min", "max", "restitution", "friction"];
-pub(in crate::lower) const OBSTACLE_KEYS: [&str; 5] =
-    ["solid", "restitution", "friction", "walls", "surface_velocity"];
-const FREE_SLIP: (&str, Slip) = ("free_slip", Slip::Free);
-const NO_SLIP: (&str, Slip) = ("no_slip", Slip::No);
-pub(in crate::lower) const RUN_KEYS: [&str; 4] = ["dt", "until", "save_every", "checkpoint_every"];
+/// How walls act on fluid that moves along them, and the words for it.
+const WALLS: &[&str] = &["free_slip", "no_slip"];
+const SLIPS: [Slip; 2] = [Slip::Free, Slip::No];
+
+declare_keys! {
+    /// Keys of a scene.
+    mod scene_keys {
+        UNITS = "units", Other, Text("\"SI\""),
+            "the system of units; there is no other one";
+        BOX = "box", Block(super::box_keys::ALL), Required,
+            "the block for the room of the simulation; its walls hold the fluid";
+        CONTAINER = "container", Block(super::obstacle_keys::ALL), Text("the box alone"),
+            "the block for a vessel within the box, in which the fluid stays";
+        FLUID = "fluid", Block(crate::lower::scene::fluid::keys::ALL), Required,
+            "the block for the fluid: where it is at the start, and what it is";
+        OBSTACLE = "obstacle", Block(super::obstacle_keys::ALL), Text("none"),
+            "a block for a solid in the fluid; there may be several";
+        GRAVITY = "gravity", Formulas(Dimension::ACCELERATION), Is3([0.0, 0.0, -9.81]),
+            "the acceleration of free fall; may depend on x, y, z and t";
+        WALLS = "walls", Words(super::WALLS), Text("free_slip"),
+            "whether the fluid slips along walls or sticks to them";
+        METHOD = "method", MethodName, Text("wcsph"),
+            "how the pressure is found";
+        SOLVER = "solver", Block(crate::lower::scene::fluid::solver_keys::ALL), Text("that of the method"),
+            "the block for how the method is run";
+        RUN = "run", Block(crate::lower::scene::run::keys::ALL), Text("5 s, a frame every 0.05 s"),
+            "the block for how long the simulation runs and what it saves";
+        TRUTH = "truth", Block(crate::lower::scene::truth::keys::ALL), Text("none"),
+            "the block for a known solution, with which the run compares the flow";
+        PROBE = "probe", Block(crate::lower::probes::keys::ALL), Text("none"),
+            "a block with a name for something that is measured; there may be several";
+        PICTURE = "picture", Block(crate::lower::scene::picture::keys::ALL), Text("the whole box"),
+            "the block for how pictures are drawn";
+        TOLERANCE = "tolerance", Number(Dimension::NONE, Bound::Positive), Text("none"),
+            "the largest error of ω that is accepted for the obstacles";
+    }
+}
+
+declare_keys! {
+    /// Keys of the box.
+    mod box_keys {
+        MIN = "min", Vector(Dimension::LENGTH), Is3([0.0, 0.0, 0.0]),
+            "the lowest corner";
+        MAX = "max", Vector(Dimension::LENGTH), Required,
+            "the highest corner";
+        RESTITUTION = "restitution", Number(Dimension::NONE, Bound::Fraction), Is(0.5),
+            "the part of its normal speed with which a particle that hits a wall bounces off, 0 … 1";
+        FRICTION = "friction", Number(Dimension::NONE, Bound::NotNegative), Is(0.0),
+            "the coefficient of friction of particles that hit a wall; a fluid that rests on a wall is held off it by pressure, and feels no friction";
+    }
+}
+
+declare_keys! {
+    /// Keys of a container or an obstacle.
+    mod obstacle_keys {
+        SOLID = "solid", Other, Required,
+            "the solid, by its name or written here";
+        RESTITUTION = "restitution", Number(Dimension::NONE, Bound::Fraction), Is(0.5),
+            "the part of its normal speed with which a particle that hits it bounces off, 0 … 1";
+        FRICTION = "friction", Number(Dimension::NONE, Bound::NotNegative), Is(0.0),
+            "the coefficient of friction of particles that hit it; a fluid that rests on it is held off by pressure, and feels no friction";
+        WALLS = "walls", Words(super::WALLS), Text("that of the scene"),
+            "whether the fluid slips along it or sticks to it";
+        SURFACE_VELOCITY = "surface_velocity", Formulas(Dimension::SPEED), Is3([0.0, 0.0, 0.0]),
+            "how fast its surface moves within itself, as a belt does; may depend on x, y, z and t";
+    }
+}
 
 impl<'a> Lowering<'a> {
     /// Reads a scene; `None` if it has errors, which are reported.
@@ -45,13 +90,13 @@ impl<'a> Lowering<'a> {
             &scene.entries,
             "a scene",
             scene.name.span,
-            &SCENE_KEYS,
+            scene_keys::ALL,
             &["obstacle", "fluid", "probe"],
         );
         self.units(&block);
         let domain = self.domain(&block);
         let fluid = self.fluid_and_method(&block);
-        let slip = self.word_key(&block, "walls", &[FREE_SLIP, NO_SLIP]);
+        let slip = self.word_key(&block, &scene_keys::WALLS, &SLIPS, Slip::Free);
         let walls = slip.unwrap_or(Slip::Free);
         let container = self.container(&block, walls);
         let obstacles: Vec<Obstacle> = block
@@ -80,7 +125,8 @@ impl<'a> Lowering<'a> {
             // what they may refer to has mistakes that were reported
             _ => Vec::new(),
         };
-        let tolerance = block.setting("tolerance").and_then(|(_, value)| self.tolerance(value));
+        let tolerance =
+            block.setting(scene_keys::TOLERANCE.name).and_then(|(_, value)| self.tolerance(value));
         if self.errors() > errors_before {
             return None;
         }
@@ -109,7 +155,7 @@ impl<'a> Lowering<'a> {
 
     /// Reads a tolerance of ω; `None` if it is not positive and finite, which is reported.
     pub fn tolerance(&mut self, value: &Expr) -> Option<Tolerance> {
-        let number = self.quantity_expr(value, Dimension::NONE, "tolerance")?;
+        let number = self.quantity_expr(value, Dimension::NONE, scene_keys::TOLERANCE.name)?;
         if number > 0.0 && number.is_finite() {
             return Some(Tolerance { value: number, span: value.span });
         }
@@ -119,7 +165,7 @@ impl<'a> Lowering<'a> {
     }
 
     fn units(&mut self, block: &Block<'_>) {
-        if let Some((_, value)) = block.setting("units")
+        if let Some((_, value)) = block.setting(scene_keys::UNITS.name)
             && value.kind != ExprKind::Text("SI".into())
         {
             let message = "the only system of units is \"SI\"";
@@ -135,14 +181,15 @@ impl<'a> Lowering<'a> {
             self.missing(block, "box", "write `box { min: [0, 0, 0], max: [3, 3, 3] }`");
             return None;
         };
-        let block = self.block(entries, "a box", span, &BOX_KEYS, &[]);
-        let min = self.vector_key(&block, "min", Dimension::LENGTH, DVec3::ZERO);
-        let is_misspelt = entries.iter().any(|entry| !BOX_KEYS.contains(&entry.key().text.as_str()));
-        if block.setting("max").is_none() && !is_misspelt {
-            self.missing(&block, "max", "write `max: [3, 3, 3]`");
+        let block = self.block(entries, "a box", span, box_keys::ALL, &[]);
+        let min = self.vector_key(&block, &box_keys::MIN);
+        let is_misspelt =
+            entries.iter().any(|entry| !names(box_keys::ALL).any(|key| key == entry.key().text));
+        if block.setting(box_keys::MAX.name).is_none() && !is_misspelt {
+            self.missing(&block, box_keys::MAX.name, "write `max: [3, 3, 3]`");
         }
-        let max = self.vector_key(&block, "max", Dimension::LENGTH, DVec3::ONE);
-        let bounce = self.bounce(&block);
+        let max = self.stated_vector(&block, &box_keys::MAX).map(|max| max.unwrap_or(DVec3::ONE));
+        let bounce = self.bounce(&block, [&box_keys::RESTITUTION, &box_keys::FRICTION]);
         let (min, max) = (min?, max?);
         if !max.cmpgt(min).all() {
             let message = format!("the box has no room: its size is {}", max - min);
@@ -155,9 +202,8 @@ impl<'a> Lowering<'a> {
         Some((Aabb::new(min, max), bounce?, span))
     }
 
-    fn bounce(&mut self, block: &Block<'_>) -> Option<Bounce> {
-        let restitution = self.number_key(block, "restitution", Dimension::NONE, Some(0.5), Bound::Fraction);
-        let friction = self.number_key(block, "friction", Dimension::NONE, Some(0.0), Bound::NotNegative);
+    fn bounce(&mut self, block: &Block<'_>, [restitution, friction]: [&SceneKey; 2]) -> Option<Bounce> {
+        let (restitution, friction) = (self.number_key(block, restitution), self.number_key(block, friction));
         Some(Bounce { restitution: restitution?, friction: friction? })
     }
 
@@ -171,10 +217,9 @@ impl<'a> Lowering<'a> {
     /// Reads how a solid acts at its surface. Unless it says otherwise, it lets the fluid slip or stick as
     /// `walls` do.
     fn skin(&mut self, block: &Block<'_>, walls: Slip) -> Option<Skin> {
-        let bounce = self.bounce(block);
-        let words = if walls == Slip::No { [NO_SLIP, FREE_SLIP] } else { [FREE_SLIP, NO_SLIP] };
-        let slip = self.word_key(block, "walls", &words)?;
-        let velocity = match block.setting("surface_velocity") {
+        let bounce = self.bounce(block, [&obstacle_keys::RESTITUTION, &obstacle_keys::FRICTION]);
+        let slip = self.word_key(block, &obstacle_keys::WALLS, &SLIPS, walls)?;
+        let velocity = match block.setting(obstacle_keys::SURFACE_VELOCITY.name) {
             Some((key, value)) => {
                 if slip == Slip::Free {
                     let message = "a surface along which the fluid slips does not take it along";
@@ -183,7 +228,7 @@ impl<'a> Lowering<'a> {
                             .help("write `walls: no_slip` beside it, or leave `surface_velocity` out"),
                     );
                 }
-                Some(self.components(value, Dimension::SPEED, "surface_velocity")?)
+                Some(self.components(value, &obstacle_keys::SURFACE_VELOCITY)?)
             }
             None => None,
         };
@@ -191,50 +236,17 @@ impl<'a> Lowering<'a> {
     }
 
     fn gravity(&mut self, block: &Block<'_>) -> Option<Gravity> {
-        let Some((_, value)) = block.setting("gravity") else {
-            return Some(Gravity::Still(DVec3::new(0.0, 0.0, -9.81)));
+        let key = &scene_keys::GRAVITY;
+        let Some((_, value)) = block.setting(key.name) else {
+            return key.vector_without().map(Gravity::Still);
         };
-        let nodes = self.components(value, Dimension::ACCELERATION, "gravity")?;
+        let nodes = self.components(value, key)?;
         let turns = nodes.iter().any(|&node| self.known_value(node).is_none());
         if !turns {
-            return self
-                .vector_key(block, "gravity", Dimension::ACCELERATION, DVec3::ZERO)
-                .map(Gravity::Still);
+            return self.vector_key(block, key).map(Gravity::Still);
         }
         let of_place = nodes.iter().any(|&node| self.depends_on_place(node));
         Some(if of_place { Gravity::Field(nodes) } else { Gravity::Turning(nodes) })
-    }
-
-    fn truth(&mut self, block: &Block<'_>) -> Option<Option<Truth>> {
-        let Some((_, entries, span)) = block.blocks("truth").next() else { return Some(None) };
-        let block = self.block(entries, "a truth", span, &TRUTH_KEYS, &[]);
-        let mut formula = |key| match block.setting(key) {
-            Some((_, value)) => {
-                let found = self.expr(value);
-                Some(Some((self.as_number(&found, value.span)?, value.span)))
-            }
-            None => Some(None),
-        };
-        let (pressure, front) = (formula("pressure")?.map(|(node, _)| node), formula("front")?);
-        if let Some((node, span)) = front
-            && self.depends_on_place(node)
-        {
-            let message = "`front` may depend on the time t, not on the place";
-            self.report(Diagnostic::error(Code::NOT_CONSTANT, span, message));
-            return None;
-        }
-        let front = front.map(|(node, _)| node);
-        let velocity = match block.setting("velocity") {
-            Some((_, value)) => Some(self.components(value, Dimension::SPEED, "velocity")?),
-            None => None,
-        };
-        if pressure.is_none() && velocity.is_none() && front.is_none() {
-            let help = "write `pressure: 1000*9.81*(1 - z)`, `velocity: [..]` or `front: 2*t`";
-            self.missing(&block, "pressure", help);
-            return None;
-        }
-        let from = self.number_key(&block, "from", Dimension::TIME, Some(0.0), Bound::NotNegative)?;
-        Some(Some(Truth { pressure, velocity, front, from }))
     }
 
     fn obstacle(
@@ -244,10 +256,10 @@ impl<'a> Lowering<'a> {
         what: &'static str,
         walls: Slip,
     ) -> Option<Obstacle> {
-        let block = self.block(entries, what, span, &OBSTACLE_KEYS, &[]);
+        let block = self.block(entries, what, span, obstacle_keys::ALL, &[]);
         let skin = self.skin(&block, walls);
-        let Some((_, value)) = block.setting("solid") else {
-            self.missing(&block, "solid", "write `solid: pawn` with the name of a solid");
+        let Some((_, value)) = block.setting(obstacle_keys::SOLID.name) else {
+            self.missing(&block, obstacle_keys::SOLID.name, "write `solid: pawn` with the name of a solid");
             return None;
         };
         let shape = self.shape(value)?;
@@ -256,87 +268,5 @@ impl<'a> Lowering<'a> {
             _ => "obstacle".into(),
         };
         Some(Obstacle { name, shape, span: value.span, skin: skin? })
-    }
-
-    fn run(&mut self, block: &Block<'_>) -> Option<Run> {
-        let defaults = Run { dt: None, dt_span: None, until: 5.0, save_every: 0.05, checkpoint_every: None };
-        let Some((_, entries, span)) = block.blocks("run").next() else { return Some(defaults) };
-        let block = self.block(entries, "a run", span, &RUN_KEYS, &[]);
-        let mut optional = |key| match block.setting(key) {
-            Some(_) => self.number_key(&block, key, Dimension::TIME, None, Bound::Positive).map(Some),
-            None => Some(None),
-        };
-        let (dt, checkpoint_every) = (optional("dt"), optional("checkpoint_every"));
-        let until = self.number_key(&block, "until", Dimension::TIME, Some(defaults.until), Bound::Positive);
-        let save = self.number_key(
-            &block,
-            "save_every",
-            Dimension::TIME,
-            Some(defaults.save_every),
-            Bound::Positive,
-        );
-        let run = Run {
-            dt: dt?,
-            dt_span: block.setting("dt").map(|(_, value)| value.span),
-            until: until?,
-            save_every: save?,
-            checkpoint_every: checkpoint_every?,
-        };
-        if let (Some(every), Some((_, value))) = (run.checkpoint_every, block.setting("checkpoint_every"))
-            && every > run.until
-        {
-            let [until, every] = [run.until, every].map(seconds_as_written);
-            let message = format!("a checkpoint every {every} in a run of {until}: only its end is saved");
-            let help =
-                "a run that is interrupted saves one too; without this key there is one with every frame";
-            self.report(Diagnostic::warning(Code::FRAMES, value.span, message).help(help));
-        }
-        if let (Some(dt), Some(at)) = (run.dt, run.dt_span)
-            && dt > run.until
-        {
-            let [until, step] = [run.until, dt].map(seconds_as_written);
-            let message = format!("a step of {step} is longer than the run of {until}");
-            let help = "leave `dt` out: the step is then as long as is stable";
-            self.report(Diagnostic::error(Code::OUT_OF_RANGE, at, message).help(help));
-            return None;
-        }
-        let stated =
-            block.setting("save_every").or(block.setting("until")).map_or(span, |(_, value)| value.span);
-        self.frames_fit(&run, stated).then_some(run)
-    }
-
-    /// Reports frames that would fill a disk, and warns of frames so rare that there are none.
-    fn frames_fit(&mut self, run: &Run, at: Span) -> bool {
-        const MANY: f64 = 20_000.0;
-        let frames = run.until / run.save_every;
-        let [until, every] = [run.until, run.save_every].map(seconds_as_written);
-        let fewer = format!("write for example `save_every: {}`", seconds_as_written(run.until / 100.0));
-        if frames > Scene::MOST_FRAMES as f64 {
-            let message = format!(
-                "{until} with a frame every {every} are {frames:.3e} frames; at most {} are saved",
-                Scene::MOST_FRAMES
-            );
-            self.report(Diagnostic::error(Code::OUT_OF_RANGE, at, message).help(fewer));
-            return false;
-        }
-        if frames > MANY {
-            let message = format!("{until} with a frame every {every} are {frames:.0} frames");
-            self.report(Diagnostic::warning(Code::FRAMES, at, message).help(fewer));
-        } else if run.save_every > run.until {
-            let message =
-                format!("a frame every {every} in a run of {until}: only its start and its end are saved");
-            self.report(Diagnostic::warning(Code::FRAMES, at, message).help(fewer));
-        }
-        true
-    }
-}
-
-/// A time as a file writes it, with two digits: `50 ms`, `0.2 s`.
-fn seconds_as_written(time: f64) -> String {
-    let rounded = |value: f64| format!("{value:.1e}").parse().unwrap_or(value);
-    if time < 0.1 && time > 1e-5 {
-        format!("{} ms", rounded(1e3 * time))
-    } else {
-        format!("{} s", rounded(time))
     }
 }
