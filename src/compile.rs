@@ -33,8 +33,8 @@ use crate::syntax::{self, Ast};
 pub use crate::codegen::CodegenError;
 #[doc(inline)]
 pub use crate::lower::{
-    AskedMean, Bounce, Container, Fluid, Gravity, Measured, Module, NamedSolid, Obstacle, OpenParams,
-    Opening, Options, ParamValue, Picture, Probe, Run, Scene, Skin, Solver, Tolerance, Truth,
+    AskedMean, Bounce, Container, Fluid, Gravity, Module, NamedSolid, Obstacle, OpenParams, Opening, Options,
+    ParamValue, Picture, Run, Scene, SceneProbe, Skin, Solver, Tolerance, Truth,
 };
 pub use folder::files_beside;
 #[doc(hidden)]

@@ -7,7 +7,7 @@ use rfm::experiment::{self, Body, Taken};
 use rfm::geom::{Aabb, to_thousandths};
 use rfm::glam::DVec3;
 use rfm::ir::Node;
-use rfm::lower::{Measured, NamedSolid, Obstacle, Scene};
+use rfm::lower::{NamedSolid, Obstacle, Scene};
 use rfm::solid::{Break, Breakage, ProgramKind, ThinPart, Uneven};
 use rfm::syntax::ast::Item;
 use rfm::{Engine, Error, Experiment, Program, Solid};
@@ -453,7 +453,7 @@ fn wall_limit(scene: &Scene, number: usize) -> f64 {
     let is_loaded = scene
         .probes
         .iter()
-        .any(|probe| matches!(probe.measured, Measured::Force { body, .. } if body == number));
+        .any(|probe| matches!(probe.measured, rfm::sph::Probe::Force { obstacle, .. } if obstacle == number));
     if is_loaded { LOADED_WALL } else { THIN_WALL }
 }
 

@@ -5,8 +5,8 @@ use super::wall_speed;
 use crate::diagnostic::{Code, Diagnostic};
 use crate::field::Moving;
 use crate::geom::{Aabb, Placement};
-use crate::lower::{AskedMean, Measured, Probe, Scene};
-use crate::sph::Parameters;
+use crate::lower::{AskedMean, Scene, SceneProbe};
+use crate::sph::{Parameters, Probe};
 
 /// A body counts as at rest if it moves less than this part of the support radius while its mean force is
 /// taken: less than is seen of its surface. A body that comes to rest slowly never stops completely.
@@ -28,8 +28,8 @@ pub(super) fn warnings(scene: &Scene, parameters: &Parameters, bodies: &[Body]) 
     if is_thick || !parameters.drag_is_too_large() {
         return Vec::new();
     }
-    let told = |probe: &Probe| {
-        let (Measured::Force { body: number, .. }, Some(mean)) = (probe.measured, &probe.mean) else {
+    let told = |probe: &SceneProbe| {
+        let (Probe::Force { obstacle: number, .. }, Some(mean)) = (probe.measured, &probe.mean) else {
             return None;
         };
         let body = bodies.get(number)?;

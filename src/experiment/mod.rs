@@ -49,7 +49,7 @@ pub use filling::spacing;
 pub use mean::Mean;
 pub use out_of_reach::is_out_of_reach;
 pub use parameters::TimeStep;
-pub use probes::{probe_column, probe_of};
+pub use probes::probe_column;
 pub use room::{Taken, outside_the_container, taken_by_obstacles};
 
 /// A scene, compiled and checked: all that a simulation needs besides its particles.

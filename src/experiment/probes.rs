@@ -2,29 +2,16 @@
 
 use super::bodies::Body;
 use crate::diagnostic::{Code, Diagnostic};
-use crate::lower::{Measured, Scene};
+use crate::lower::{Scene, SceneProbe};
 use crate::sph::Probe;
-
-/// The probe for what a scene wants measured.
-pub fn probe_of(measured: &Measured) -> Probe {
-    match *measured {
-        Measured::Height([x, y]) => Probe::Height { x, y },
-        Measured::Pressure(at) => Probe::Pressure { at },
-        Measured::Velocity(at) => Probe::Velocity { at },
-        Measured::Force { body, about } => Probe::Force { obstacle: body, about },
-        Measured::Flux { point, normal } => Probe::Flux { point, normal },
-        Measured::Energy => Probe::Energy,
-        Measured::Audit => Probe::Audit,
-    }
-}
 
 /// A place nearer to a surface than this part of the spacing lies on it.
 const ON_SURFACE: f64 = 1e-3;
 
 /// A warning for each probe of a place that lies in a body at rest, where there is never any fluid.
 pub(super) fn in_bodies(scene: &Scene, bodies: &[Body], spacing: f64) -> Vec<Diagnostic> {
-    let told = |probe: &crate::lower::Probe| {
-        let (Measured::Pressure(at) | Measured::Velocity(at)) = probe.measured else { return None };
+    let told = |probe: &SceneProbe| {
+        let (Probe::Pressure { at } | Probe::Velocity { at }) = probe.measured else { return None };
         // a place on the surface may be a rounding inside
         let is_deep = |body: &Body| body.solid.contact(at).distance < -ON_SURFACE * spacing;
         let holds =

@@ -41,8 +41,8 @@ use std::sync::OnceLock;
 pub use imports::{Imported, unread};
 pub use module::{Module, NamedSolid, ParamValue};
 pub use scene::{
-    AskedMean, Bounce, Container, Fluid, Gravity, Measured, Obstacle, Opening, Picture, Probe, Run, Scene,
-    Skin, Solver, Tolerance, Truth,
+    AskedMean, Bounce, Container, Fluid, Gravity, Obstacle, Opening, Picture, Run, Scene, SceneProbe, Skin,
+    Solver, Tolerance, Truth,
 };
 
 use crate::diagnostic::{Code, Diagnostic, Severity, Source, SourceId, Span};

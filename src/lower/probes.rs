@@ -6,10 +6,11 @@ use glam::DVec3;
 
 use super::lowering::Lowering;
 use super::scene::declaration::{SceneKey, declare_keys, names};
-use super::scene::{AskedMean, Block, Measured, Probe};
+use super::scene::{AskedMean, Block, SceneProbe};
 use crate::diagnostic::{Code, Diagnostic};
 use crate::geom::Aabb;
 use crate::quantity::Dimension;
+use crate::sph::Probe;
 use crate::syntax::ast::{Entry, Expr, ExprKind};
 
 const MEASURED: [&str; 7] = ["height", "pressure", "velocity", "force", "flux", "energy", "audit"];
@@ -63,8 +64,8 @@ pub(super) struct Surroundings<'a> {
 }
 
 impl<'a> Lowering<'a> {
-    pub(super) fn probes(&mut self, scene: &Block<'a>, around: &Surroundings<'_>) -> Vec<Probe> {
-        let mut probes: Vec<Probe> = Vec::new();
+    pub(super) fn probes(&mut self, scene: &Block<'a>, around: &Surroundings<'_>) -> Vec<SceneProbe> {
+        let mut probes: Vec<SceneProbe> = Vec::new();
         for (label, entries, span) in scene.blocks("probe") {
             let Some(label) = label else {
                 self.report(
@@ -84,14 +85,14 @@ impl<'a> Lowering<'a> {
             let every = self.stated_number(&block, &keys::EVERY);
             let Some(measured) = self.measured(&block, around) else { continue };
             if let (Some(every), Some(mean)) = (every, self.mean(&block, measured, around.until)) {
-                probes.push(Probe { name: label.text.clone(), span: label.span, measured, every, mean });
+                probes.push(SceneProbe { name: label.text.clone(), span: label.span, measured, every, mean });
             }
         }
         probes
     }
 
     /// Reads `from` and `known`, which ask for a mean; the outer `None` is a mistake that was reported.
-    fn mean(&mut self, block: &Block<'_>, measured: Measured, until: f64) -> Option<Option<AskedMean>> {
+    fn mean(&mut self, block: &Block<'_>, measured: Probe, until: f64) -> Option<Option<AskedMean>> {
         let start = block.setting(keys::FROM.name).map(|(_, value)| value.span);
         let known = block.setting(keys::KNOWN.name);
         if start.is_none() && known.is_none() {
@@ -117,19 +118,19 @@ impl<'a> Lowering<'a> {
     }
 
     /// Reads what is known of a mean: a number, or a vector where a probe measures one.
-    fn known(&mut self, block: &Block<'_>, value: &Expr, measured: Measured) -> Option<Vec<f64>> {
+    fn known(&mut self, block: &Block<'_>, value: &Expr, measured: Probe) -> Option<Vec<f64>> {
         let mut number = |dimension| self.quantity_expr(value, dimension, "known").map(|known| vec![known]);
         match measured {
-            Measured::Height(_) => number(Dimension::LENGTH),
-            Measured::Pressure(_) => number(Dimension::PRESSURE),
-            Measured::Flux { .. } => number(Dimension::MASS_FLOW),
-            Measured::Velocity(_) | Measured::Force { .. } => {
-                let is_force = matches!(measured, Measured::Force { .. });
+            Probe::Height { .. } => number(Dimension::LENGTH),
+            Probe::Pressure { .. } => number(Dimension::PRESSURE),
+            Probe::Flux { .. } => number(Dimension::MASS_FLOW),
+            Probe::Velocity { .. } | Probe::Force { .. } => {
+                let is_force = matches!(measured, Probe::Force { .. });
                 let dimension = if is_force { Dimension::FORCE } else { Dimension::SPEED };
                 let known = self.vector_in(block, keys::KNOWN.name, dimension)??;
                 Some(known.to_array().into())
             }
-            Measured::Energy | Measured::Audit => {
+            Probe::Energy | Probe::Audit => {
                 let message = "`known` has no meaning for the energy and the audit";
                 self.report(
                     Diagnostic::error(Code::SCENE_KEY, value.span, message)
@@ -140,7 +141,7 @@ impl<'a> Lowering<'a> {
         }
     }
 
-    fn measured(&mut self, block: &Block<'_>, around: &Surroundings<'_>) -> Option<Measured> {
+    fn measured(&mut self, block: &Block<'_>, around: &Surroundings<'_>) -> Option<Probe> {
         let mut stated =
             block.entries.iter().map(Entry::key).filter(|key| MEASURED.contains(&key.text.as_str()));
         let Some(key) = stated.next() else {
@@ -174,24 +175,27 @@ impl<'a> Lowering<'a> {
         }
         let (_, value) = block.setting(&key.text)?; // a block in place of the value was reported
         match key.text.as_str() {
-            "height" => self.place_on_ground(value, domain).map(Measured::Height),
-            "pressure" => self.place(block, &keys::PRESSURE, domain).map(Measured::Pressure),
-            "velocity" => self.place(block, &keys::VELOCITY, domain).map(Measured::Velocity),
+            "height" => self.place_on_ground(value, domain).map(|[x, y]| Probe::Height { x, y }),
+            "pressure" => self.place(block, &keys::PRESSURE, domain).map(|at| Probe::Pressure { at }),
+            "velocity" => self.place(block, &keys::VELOCITY, domain).map(|at| Probe::Velocity { at }),
             "force" => {
                 let body = self.one_of(value, "force", &around.bodies, "obstacle of this scene");
                 let about = self.vector_key(block, &keys::ABOUT);
-                Some(Measured::Force { body: body?, about: about? })
+                Some(Probe::Force { obstacle: body?, about: about? })
             }
-            "audit" => {
-                self.one_of(value, "audit", &[around.fluid], "fluid of this scene").map(|_| Measured::Audit)
-            }
-            _ => {
-                self.one_of(value, "energy", &[around.fluid], "fluid of this scene").map(|_| Measured::Energy)
-            }
+            "energy" => self.of_fluid(value, "energy", around).map(|()| Probe::Energy),
+            "audit" => self.of_fluid(value, "audit", around).map(|()| Probe::Audit),
+            // a flux is a block, and was read
+            _ => None,
         }
     }
 
-    fn flux(&mut self, block: &Block<'_>, domain: &Aabb) -> Option<Measured> {
+    /// Checks the name of the fluid that a probe measures.
+    fn of_fluid(&mut self, value: &Expr, key: &str, around: &Surroundings<'_>) -> Option<()> {
+        self.one_of(value, key, &[around.fluid], "fluid of this scene").map(|_| ())
+    }
+
+    fn flux(&mut self, block: &Block<'_>, domain: &Aabb) -> Option<Probe> {
         let (_, entries, span) = block.blocks("flux").next()?;
         let block = self.block(entries, "a flux", span, flux_keys::ALL, &[]);
         for (key, help) in [("point", "write `point: [1, 0, 0]`"), ("normal", "write `normal: [1, 0, 0]`")] {
@@ -208,7 +212,7 @@ impl<'a> Lowering<'a> {
             self.report(Diagnostic::error(Code::OUT_OF_RANGE, at, message));
             return None;
         };
-        Some(Measured::Flux { point: point?, normal: unit })
+        Some(Probe::Flux { point: point?, normal: unit })
     }
 
     /// Reads a place, which must lie in the box.

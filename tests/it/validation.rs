@@ -3,7 +3,7 @@
 
 use std::ops::ControlFlow;
 
-use rfm::experiment::{Deviation, Deviations, probe_of};
+use rfm::experiment::{Deviation, Deviations};
 use rfm::glam::DVec3;
 use rfm::lower::Scene;
 use rfm::sph::{Probe, Simulation};
@@ -437,7 +437,7 @@ fn forces_on_bodies_are_those_of_momentum_and_of_archimedes() {
         let Some(asked) = &probe.mean else { panic!("{name}: no mean is asked for") };
         let experiment = Experiment::new(&program, &scene.name, Engine::Auto).unwrap();
         let mut simulation = experiment.start().unwrap().simulation;
-        let mut gauge = simulation.gauge(probe_of(&probe.measured)).unwrap();
+        let mut gauge = simulation.gauge(probe.measured).unwrap();
         simulation.advance(asked.from, |_| ControlFlow::Continue(())).unwrap();
         simulation.sample(&mut gauge);
         simulation.advance(scene.run.until, |_| ControlFlow::Continue(())).unwrap();

@@ -83,7 +83,7 @@ fn work_does_not_depend_on_whether_forces_are_asked_for() {
             let experiment = experiment(&text);
             let mut simulation = experiment.start().unwrap_or_else(|e| panic!("{e}")).simulation;
             for probe in &experiment.scene().probes {
-                simulation.gauge(rfm::experiment::probe_of(&probe.measured)).unwrap();
+                simulation.gauge(probe.measured).unwrap();
             }
             simulation.advance(0.6, |_| ControlFlow::Continue(())).unwrap();
             let audit = simulation.audit();

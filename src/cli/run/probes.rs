@@ -18,7 +18,7 @@ use super::probe_plot::{drawn, rows};
 use crate::cli::output::Shown;
 use crate::cli::saved::{HISTORY, OWN_TABLES};
 use rfm::diagnostic::Code;
-use rfm::experiment::{Every, probe_column, probe_of};
+use rfm::experiment::{Every, probe_column};
 use rfm::lower::{AskedMean, Scene};
 use rfm::sph::{Checkpoint, Gauge, Probe, Simulation, short_time};
 
@@ -65,7 +65,7 @@ impl Probes {
         }
         let mut stated = Vec::new();
         for probe in &scene.probes {
-            let measured = probe_of(&probe.measured);
+            let measured = probe.measured;
             let memory = resumed.and_then(|checkpoint| checkpoint.get(&probe_column(&probe.name)).ok());
             let gauge = match resumed {
                 Some(checkpoint) => simulation.gauge_at(measured, checkpoint, memory.unwrap_or_default()),

@@ -5,7 +5,6 @@
 use std::path::{Path, PathBuf};
 
 use crate::cli::saved::{HISTORY, OWN_TABLES};
-use rfm::experiment::probe_of;
 use rfm::lower::Scene;
 use rfm::sph::{Gauge, Probe, Simulation};
 use rfm::view::{Column, Plot};
@@ -130,7 +129,7 @@ pub(super) struct History {
 impl History {
     /// The energy, the audit and the probes of a scene, with a first sample.
     pub fn start(simulation: &mut Simulation, scene: &Scene) -> Self {
-        let stated = scene.probes.iter().map(|probe| (probe.name.as_str(), probe_of(&probe.measured)));
+        let stated = scene.probes.iter().map(|probe| (probe.name.as_str(), probe.measured));
         let stated: Vec<(&str, Probe)> = stated.collect();
         let own = OWN_TABLES.into_iter().filter(|(_, own)| !stated.iter().any(|(_, probe)| probe == own));
         let prepared = own.chain(stated.iter().copied()).filter_map(|(name, probe)| {

@@ -22,7 +22,7 @@ use crate::diagnostic::Span;
 use crate::geom::Aabb;
 use crate::ir::Node;
 use crate::precision::Precision;
-use crate::sph::{Fill, Method, Slip};
+use crate::sph::{Fill, Method, Probe, Slip};
 
 /// The acceleration of the whole fluid by gravity, m/s².
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -77,7 +77,7 @@ pub struct Scene {
     /// The known solution with which the flow is compared.
     pub truth: Option<Truth>,
     /// What is measured during the run.
-    pub probes: Vec<Probe>,
+    pub probes: Vec<SceneProbe>,
     /// How its pictures are drawn.
     pub picture: Picture,
     /// The largest error of ω that is accepted for the obstacles in the box, if it is stated.
@@ -213,13 +213,13 @@ pub struct Run {
 
 /// A measurement that goes on while a scene runs.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Probe {
+pub struct SceneProbe {
     /// Name of the probe, and of its files.
     pub name: String,
     /// Place of the name.
     pub span: Span,
     /// What is measured.
-    pub measured: Measured,
+    pub measured: Probe,
     /// Simulated time between samples, s; `None`: that between frames.
     pub every: Option<f64>,
     /// The mean that is taken of the samples; `None` if it is not asked for.
@@ -235,36 +235,6 @@ pub struct AskedMean {
     pub known: Vec<f64>,
     /// Whether the torque of a force is asked for: its point is stated.
     pub torque: bool,
-}
-
-/// What a probe measures, with numbers in SI units.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Measured {
-    /// Height z of the fluid's surface above a place (x, y), m.
-    Height([f64; 2]),
-    /// Pressure at a place, Pa.
-    Pressure(DVec3),
-    /// Velocity at a place, m/s.
-    Velocity(DVec3),
-    /// Force on a body, N, and its torque about a point, N·m. Bodies are numbered: the container first, then
-    /// the obstacles.
-    Force {
-        /// Number of the body, from 0.
-        body: usize,
-        /// The point to which the torque refers, m.
-        about: DVec3,
-    },
-    /// Mass flow through a plane along its normal, kg/s.
-    Flux {
-        /// A point of the plane, m.
-        point: DVec3,
-        /// Unit normal of the plane.
-        normal: DVec3,
-    },
-    /// Kinetic, potential and elastic energy of the fluid and their sum, J.
-    Energy,
-    /// Excess of the fluid's energy, change of its volume, its compression, and the greatest speed, m/s.
-    Audit,
 }
 
 /// How the pictures of a scene are drawn.

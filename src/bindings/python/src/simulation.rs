@@ -9,7 +9,7 @@ use pyo3::exceptions::{PyBufferError, PyRuntimeError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::sync::PyOnceLock;
 use pyo3::types::{PyDict, PyTuple, PyType};
-use rfm::experiment::{Every, Start, probe_column, probe_of};
+use rfm::experiment::{Every, Start, probe_column};
 use rfm::sph::{Checkpoint, Gauge, Simulation, StepError};
 use rfm::{Engine, Experiment};
 
@@ -105,7 +105,7 @@ fn recorders(
     let scene = experiment.scene();
     let mut recorders = Vec::new();
     for stated in &scene.probes {
-        let probe = probe_of(&stated.measured);
+        let probe = stated.measured;
         let gauge = match resumed {
             Some(from) => {
                 let memory = from.get(&probe_column(&stated.name)).unwrap_or_default();
@@ -484,7 +484,7 @@ impl PySimulation {
         for stated in &self.experiment.scene().probes {
             let units = PyDict::new(py);
             units.set_item("time", "s")?;
-            for (name, unit) in probe_of(&stated.measured).columns() {
+            for (name, unit) in stated.measured.columns() {
                 units.set_item(name, unit)?;
             }
             probes.set_item(&stated.name, units)?;
