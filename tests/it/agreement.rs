@@ -5,6 +5,8 @@ use rfm::codegen::Form;
 use rfm::glam::{DVec3, Vec3};
 use rfm::{Engine, Field, Program, Solid};
 
+use crate::random::Random;
+
 fn example(name: &str) -> [Solid; 2] {
     let path = format!("{}/examples/{name}.rfm", env!("CARGO_MANIFEST_DIR"));
     let program = Program::from_path(path).unwrap_or_else(|e| panic!("{e}"));
@@ -79,13 +81,10 @@ fn machine_code_is_the_interpreter() {
 #[test]
 fn batches_of_any_length_are_the_single_points() {
     let [jit, _] = example("bishop");
-    let mut seed = 1u64;
-    let mut random = || {
-        seed = seed.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
-        3.0 * (seed >> 11) as f64 / (1u64 << 53) as f64
-    };
+    let mut random = Random(1);
     for n in [0, 1, 2, 3, 4, 5, 7, 8, 31, 100] {
-        let [x, y, z] = std::array::from_fn(|_| (0..n + 1).map(|_| random()).collect::<Vec<f64>>());
+        let [x, y, z] =
+            std::array::from_fn(|_| (0..n + 1).map(|_| random.within(0.0, 3.0)).collect::<Vec<f64>>());
         // begins one past the start: no alignment may be needed
         let points = [&x[1..], &y[1..], &z[1..]];
         let mut omega = vec![0.0; n];

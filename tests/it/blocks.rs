@@ -4,6 +4,8 @@
 use rfm::glam::{DVec3, Vec3};
 use rfm::{Engine, Program, Solid};
 
+use crate::random::Random;
+
 /// Scenes whose graphs fall into blocks in every possible way.
 fn scenes() -> Vec<(&'static str, String)> {
     let balls = |joined: &dyn Fn(usize) -> String, n: usize| (0..n).map(joined).collect::<String>();
@@ -39,11 +41,11 @@ fn compile(name: &str, text: &str) -> [Solid; 2] {
 /// Random places, and some where operands are zero, equal, huge or NaN.
 fn points(count: usize) -> [Vec<f64>; 3] {
     let special = [0.0, 1.0, -1.0, 2.0, 1e30, -1e-30, f64::NAN, f64::INFINITY, 5e-324];
-    let mut seed = 7u64;
+    let mut random = Random(7);
     let mut next = || {
-        seed = seed.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
-        let (at, random) = ((seed >> 33) as usize, 6.0 * (seed >> 11) as f64 / (1u64 << 53) as f64 - 2.0);
-        if at % 11 == 0 { special[at / 11 % special.len()] } else { random }
+        let number = random.within(-2.0, 4.0);
+        let at = (random.0 >> 33) as usize;
+        if at.is_multiple_of(11) { special[at / 11 % special.len()] } else { number }
     };
     std::array::from_fn(|_| (0..count).map(|_| next()).collect())
 }

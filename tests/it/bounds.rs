@@ -7,28 +7,16 @@ use rfm::glam::{DMat3, DVec3};
 use rfm::solid::Bounds;
 use rfm::{Engine, Program, Solid};
 
+use crate::random::Random;
+
 fn solid(text: &str) -> Solid {
     let program = Program::from_source("b.rfm", format!("rfm 1\nsolid s = {text}"));
     program.unwrap_or_else(|e| panic!("{text}: {e}")).solid_with("s", Engine::Auto).unwrap()
 }
 
-/// A sequence of numbers in 0 .. 1 that depends on nothing else.
-struct Numbers(u64);
-
-impl Numbers {
-    fn next(&mut self) -> f64 {
-        self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-        (self.0 >> 11) as f64 / (1_u64 << 53) as f64
-    }
-
-    fn in_box(&mut self, over: &Aabb) -> DVec3 {
-        over.min + over.size() * DVec3::new(self.next(), self.next(), self.next())
-    }
-}
-
 /// The box of the points that are inside, among many in a box; by the signs alone.
 fn sampled(solid: &Solid, over: &Aabb, count: usize) -> Aabb {
-    let mut numbers = Numbers(1);
+    let mut numbers = Random(1);
     let points: Vec<DVec3> = (0..count).map(|_| numbers.in_box(over)).collect();
     let [x, y, z] = [0, 1, 2].map(|axis| points.iter().map(|p| p[axis]).collect::<Vec<f64>>());
     let mut sign = vec![0.0; count];
@@ -288,12 +276,12 @@ fn random_bounded_solids_have_bounds_that_hold_all_their_points() {
 
 #[test]
 fn thousands_of_parts_are_bounded_in_milliseconds() {
-    let mut numbers = Numbers(3);
+    let mut numbers = Random(3);
     let kinds = ["sphere(0.1)", "cylinder(0.05, 0.2)", "box([0, 0, 0], [0.1, 0.2, 0.1])", "torus(0.1, 0.03)"];
     let parts: Vec<String> = (0..2000)
         .map(|i| {
-            let [a, b] = [numbers.next(), numbers.next()].map(|x| 6.0 * x);
-            let [x, y, z] = [numbers.next(), numbers.next(), numbers.next()].map(|x| 10.0 * x);
+            let [a, b] = [numbers.unit(), numbers.unit()].map(|x| 6.0 * x);
+            let [x, y, z] = [numbers.unit(), numbers.unit(), numbers.unit()].map(|x| 10.0 * x);
             format!("{}.rotate_x({a}).rotate_z({b}).move([{x}, {y}, {z}])", kinds[i % 4])
         })
         .collect();

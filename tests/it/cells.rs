@@ -11,25 +11,14 @@ use rfm::mesh::{Grid, Resolution, Unwatched, check, marching_cubes};
 use rfm::solid::{CellMap, Place};
 use rfm::{Engine, Field, Program, Solid};
 
-struct Random(u64);
-
-impl Random {
-    fn unit(&mut self) -> f64 {
-        self.0 = self.0.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
-        (self.0 >> 11) as f64 / (1u64 << 53) as f64
-    }
-
-    fn point(&mut self, over: &Aabb) -> DVec3 {
-        over.min + over.size() * DVec3::new(self.unit(), self.unit(), self.unit())
-    }
-}
+use crate::random::Random;
 
 /// A union of balls, some cut by slabs, some of them holes.
 fn many(count: usize) -> String {
     let mut random = Random(11);
     let mut text = "rfm 1\nsolid many = (sphere(0.01)".to_string();
     for i in 0..count {
-        let p = random.point(&Aabb::new(DVec3::splat(0.2), DVec3::splat(2.8)));
+        let p = random.in_box(&Aabb::new(DVec3::splat(0.2), DVec3::splat(2.8)));
         let r = 0.9 * (0.05 + 0.05 * random.unit()) * (500.0 / count as f64).cbrt();
         let _ = write!(text, "\n or ball([{}, {}, {}], {r})", p.x, p.y, p.z);
         if i % 7 == 0 {
@@ -67,7 +56,7 @@ fn signs_and_surface_gradients_are_those_of_the_twin() {
             let mut random = Random(5);
             let over = domain().grown(0.2); // so that some points are outside the map
             let count = if engine == Engine::Jit { 8_000 } else { 1_000 };
-            let points: Vec<DVec3> = (0..count).map(|_| random.point(&over)).collect();
+            let points: Vec<DVec3> = (0..count).map(|_| random.in_box(&over)).collect();
             let column = |axis: usize| points.iter().map(|p| p[axis]).collect::<Vec<f64>>();
             let (x, y, z) = (column(0), column(1), column(2));
             let mut together = vec![0.0; count];
@@ -124,7 +113,7 @@ fn gradients_off_the_surface_may_be_asked_for_by_many_tasks_at_once() {
     let twin = solid.twin();
     let pool = rayon::ThreadPoolBuilder::new().num_threads(8).build().unwrap();
     let mut random = Random(29);
-    let points: Vec<DVec3> = (0..64).map(|_| random.point(&domain())).collect();
+    let points: Vec<DVec3> = (0..64).map(|_| random.in_box(&domain())).collect();
     for _ in 0..20 {
         let map = CellMap::new(&solid, domain()).unwrap();
         let signs: Vec<(i8, i8)> = pool.install(|| {
@@ -142,12 +131,12 @@ fn ranges_of_the_map_hold() {
     let mut random = Random(8);
     let mut decided = 0;
     for _ in 0..5_000 {
-        let corner = random.point(&domain());
+        let corner = random.in_box(&domain());
         let over = Aabb::new(corner, corner + 0.1 * random.unit());
         let range = map.range(&over);
         decided += i32::from(range.lo > 0.0 || range.hi < 0.0);
         for _ in 0..5 {
-            let p = random.point(&over);
+            let p = random.in_box(&over);
             let omega = solid.twin().omega(p);
             assert!(range.lo <= 0.0 || omega > 0.0, "{over:?}: {range:?}, {omega} at {p}");
             assert!(range.hi >= 0.0 || omega < 0.0, "{over:?}: {range:?}, {omega} at {p}");
@@ -206,7 +195,7 @@ fn contacts_are_those_of_the_solid() {
         let (mut near, mut other) = (0, 0);
         let mut points = Vec::new();
         while near < 3_000 {
-            let p = random.point(&domain().grown(0.01));
+            let p = random.in_box(&domain().grown(0.01));
             let found = map.contact(p);
             points.push((p, found));
             if map.place_of(p) != Place::Near && points.len() % 10 != 0 {
@@ -267,7 +256,7 @@ fn what_is_said_to_be_clear_is_clear() {
         for (field, is_map) in fields {
             let (mut partly, mut near, mut far) = (0, 0, 0);
             for _ in 0..600 {
-                let p = random.point(&domain());
+                let p = random.in_box(&domain());
                 let radius = field.clearance(p, reach);
                 assert!((0.0..=reach).contains(&radius), "{name}: {radius}");
                 let truth = solid.contact(p).distance;
@@ -277,7 +266,7 @@ fn what_is_said_to_be_clear_is_clear() {
                 if radius > 0.0 {
                     for _ in 0..20 {
                         let cube = Aabb::new(DVec3::splat(-1.0), DVec3::ONE);
-                        let q = p + radius * random.point(&cube).clamp_length_max(1.0);
+                        let q = p + radius * random.in_box(&cube).clamp_length_max(1.0);
                         assert!(
                             solid.sign(q) < 0.0,
                             "{name}: {q} is {} from {p}, of {radius}",

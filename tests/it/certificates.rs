@@ -10,6 +10,8 @@ use rfm::ir::{
 };
 use rfm::{Engine, Precision, Program, Solid};
 
+use crate::random::Random;
+
 /// One more operation of a graph, with its operands counted back from the newest node.
 type Step = (u8, usize, usize, f64);
 
@@ -192,14 +194,10 @@ fn certificates_of_ordinary_solids_are_useful() {
             let arithmetic = Arithmetic { precision, forms: &forms, inputs: Inputs::Exact };
             let bound = ErrorAnalysis::new(graph, root, arithmetic).certify(&over, 0.0);
             let program = Interpreter::with_forms(graph, &[root], [&forms, &forms]);
-            let mut seed = 1u64;
-            let mut random = || {
-                seed = seed.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
-                (seed >> 11) as f64 / (1u64 << 53) as f64
-            };
+            let mut random = Random(1);
             let mut largest: f64 = 0.0;
             for _ in 0..1000 {
-                let at = DVec3::new(random(), random(), random());
+                let at = random.in_cube();
                 let p = (over.min + over.size() * at).as_vec3().as_dvec3();
                 let Some(truth) = exact::evaluate(graph, &[root], p.to_array()) else { continue };
                 largest = largest.max(error(&program, precision, p, &truth[0]));

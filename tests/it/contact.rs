@@ -4,6 +4,8 @@ use rfm::glam::{DVec2, DVec3};
 use rfm::solid::Distances;
 use rfm::{Engine, Program, Solid};
 
+use crate::random::Random;
+
 fn solid(definition: &str) -> Solid {
     let program = Program::from_source("t.rfm", format!("rfm 1\nsolid s = {definition}"));
     program.unwrap_or_else(|e| panic!("{e}")).solid("s").unwrap()
@@ -100,15 +102,10 @@ fn pawn_distances_near_the_wall() {
     let profile = pawn_profile(&pawn);
     assert!(profile.len() > 60_000, "{}", profile.len());
     let mut errors = Vec::new();
-    let mut seed = 7u64;
-    let mut random = || {
-        seed = seed.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
-        (seed >> 11) as f64 / (1u64 << 53) as f64
-    };
+    let mut random = Random(7);
     while errors.len() < 1500 {
         // a point of the profile, moved by up to 1 cm
-        let q = profile[(random() * profile.len() as f64) as usize]
-            + DVec2::new(random() - 0.5, random() - 0.5) * 0.02;
+        let q = profile[(random.unit() * profile.len() as f64) as usize] + (random.in_square() - 0.5) * 0.02;
         let p = DVec3::new(1.5 + q.x, 1.5, q.y);
         let exact = profile.iter().map(|s| (*s - q).length_squared()).fold(f64::INFINITY, f64::min).sqrt();
         if q.x < 0.0 || !(1e-3..=1e-2).contains(&exact) {
@@ -135,15 +132,10 @@ fn pawn_distances_far_from_the_wall() {
     let path = format!("{}/examples/pawn.rfm", env!("CARGO_MANIFEST_DIR"));
     let pawn = Program::from_path(path).unwrap().solid("pawn").unwrap();
     let (profile, distances) = (pawn_profile(&pawn), Distances::new(&pawn));
-    let mut seed = 11u64;
-    let mut random = || {
-        seed = seed.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
-        (seed >> 11) as f64 / (1u64 << 53) as f64
-    };
+    let mut random = Random(11);
     let (mut errors, mut gaps) = (Vec::new(), Vec::new());
     while errors.len() < 200 {
-        let q = profile[(random() * profile.len() as f64) as usize]
-            + DVec2::new(random() - 0.5, random() - 0.5) * 0.1;
+        let q = profile[(random.unit() * profile.len() as f64) as usize] + (random.in_square() - 0.5) * 0.1;
         let p = DVec3::new(1.5 + q.x, 1.5, q.y);
         let exact = profile.iter().map(|s| (*s - q).length_squared()).fold(f64::INFINITY, f64::min).sqrt();
         if q.x < 0.0 || !(0.02..=0.05).contains(&exact) {

@@ -4,23 +4,11 @@ use rfm::glam::DVec3;
 use rfm::solid::{Distance, Distances};
 use rfm::{Program, Solid};
 
+use crate::random::Random;
+
 fn solid(text: &str) -> Solid {
     let program = Program::from_source("d.rfm", format!("rfm 1\nsolid s = {text}"));
     program.unwrap_or_else(|e| panic!("{text}: {e}")).solid("s").unwrap()
-}
-
-/// A sequence of numbers in 0 .. 1 that depends on nothing else.
-struct Numbers(u64);
-
-impl Numbers {
-    fn next(&mut self) -> f64 {
-        self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-        (self.0 >> 11) as f64 / (1_u64 << 53) as f64
-    }
-
-    fn point(&mut self, reach: f64) -> DVec3 {
-        DVec3::new(self.next(), self.next(), self.next()) * (2.0 * reach) - reach
-    }
 }
 
 /// The clearance is never above the truth, the estimate never below. The estimate is within `gap` of it; the
@@ -115,12 +103,12 @@ fn clearances_are_never_too_long() {
         ("box([-0.5, -0.7, -0.9], [0.5, 0.7, 0.9])", &cuboid),
         ("sphere(0.5) or sphere(0.3, [1, 0, 0])", &balls),
     ];
-    let mut numbers = Numbers(5);
+    let mut numbers = Random(5);
     for (text, truth) in known {
         let solid = solid(text);
         let distances = Distances::new(&solid);
         for i in 0..120 {
-            let mut p = numbers.point(2.0);
+            let mut p = numbers.around(2.0);
             if i % 4 == 0 {
                 p = p.with_x(0.0).with_y(0.0);
             }

@@ -5,6 +5,7 @@ use rfm::glam::DVec3;
 use rfm::solid::{Breakage, ThinPart};
 use rfm::{Engine, Program, Solid};
 
+use crate::random::Random;
 use crate::tool::{rfm, rfm_reading, root};
 
 fn solid(text: &str) -> Solid {
@@ -21,16 +22,6 @@ fn idle(text: &str) -> Vec<String> {
     let found = solid.idle_operands(source, &mut { usize::MAX });
     assert!(!found.is_cut, "{text}");
     found.spans.iter().map(|span| text[span.range()].to_string()).collect()
-}
-
-/// A small generator (Knuth's linear congruence).
-struct Random(u64);
-
-impl Random {
-    fn within(&mut self, low: f64, high: f64) -> f64 {
-        self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-        low + (high - low) * ((self.0 >> 11) as f64 / (1_u64 << 53) as f64)
-    }
 }
 
 /// One ball lies within another if the distance of their centres and its radius make less than the other's radius.

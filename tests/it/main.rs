@@ -44,6 +44,7 @@ mod pipeline;
 mod polygons;
 mod profiles;
 mod properties;
+mod random;
 mod ranges;
 mod render;
 mod reports;

@@ -8,6 +8,7 @@ use rfm::ir::{self, Given, Interpreter, exact};
 use rfm::solid::{CellMap, Engine, MovingMap, Place};
 use rfm::{Program, Solid, glam};
 
+use crate::random::Random;
 use crate::tool::{rfm, root};
 
 /// A solid from the text of its formula.
@@ -19,24 +20,6 @@ fn solid_with(formula: &str, engine: Engine) -> Solid {
     let text = format!("rfm 1\nsolid it = {formula}\n");
     let program = Program::from_source("moving.rfm", text).unwrap_or_else(|e| panic!("{e}"));
     program.solid_with("it", engine).unwrap()
-}
-
-/// Numbers from 0 to 1.
-struct Random(u64);
-
-impl Random {
-    fn next(&mut self) -> f64 {
-        self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-        (self.0 >> 11) as f64 / (1u64 << 53) as f64
-    }
-
-    fn within(&mut self, low: f64, high: f64) -> f64 {
-        low + (high - low) * self.next()
-    }
-
-    fn point(&mut self, reach: f64) -> DVec3 {
-        DVec3::from_array(std::array::from_fn(|_| self.within(-reach, reach)))
-    }
 }
 
 const FORMULAS: [&str; 6] = [
@@ -57,7 +40,7 @@ fn both_engines_and_both_shapes_give_the_same_bits_at_every_time() {
         for _ in 0..20 {
             let time = random.within(-3.0, 3.0);
             let (jit, interpreter) = (jit.at(time), interpreter.at(time));
-            let points: Vec<DVec3> = (0..37).map(|_| random.point(1.5)).collect();
+            let points: Vec<DVec3> = (0..37).map(|_| random.around(1.5)).collect();
             let columns: [Vec<f64>; 3] = std::array::from_fn(|i| points.iter().map(|p| p[i]).collect());
             let columns = columns.each_ref().map(Vec::as_slice);
             let (mut omega, mut rows) = (vec![0.0; 37], [const { Vec::new() }; 4]);
@@ -93,7 +76,7 @@ fn both_engines_find_the_same_entries() {
         for _ in 0..200 {
             let from = random.within(-2.0, 2.0);
             let to = from + random.within(0.0, 0.3);
-            let path = Path::new(random.point(1.5), random.point(1.5), f64::INFINITY);
+            let path = Path::new(random.around(1.5), random.around(1.5), f64::INFINITY);
             let [a, b] = solids.each_ref().map(|solid| solid.during(from, to).first_entry(&path));
             assert_eq!(a, b, "{formula}: {path:?} from {from} to {to}");
             hits += usize::from(a.is_some());
@@ -114,7 +97,7 @@ fn values_and_rates_agree_with_many_digits() {
         let rate = ir::gradient_and_rate(&mut graph, root)[3];
         let interpreter = Interpreter::new(&graph, &[rate]);
         for _ in 0..60 {
-            let (p, time) = (random.point(1.2), random.within(-2.0, 2.0));
+            let (p, time) = (random.around(1.2), random.within(-2.0, 2.0));
             let at = |time: f64| exact::evaluate_at(&graph, &[root], p.to_array(), time).unwrap().remove(0);
             let found = solid.at(time).omega(p);
             let truth = at(time);
@@ -143,13 +126,13 @@ fn ranges_hold_all_times_of_a_stretch() {
             for _ in 0..300 {
                 let from = random.within(-2.0, 2.0);
                 let to = from + random.within(0.0, 0.5);
-                let corner = random.point(1.2);
+                let corner = random.around(1.2);
                 let over = Aabb::new(corner, corner + DVec3::splat(random.within(0.0, 0.4)));
                 let stretch = solid.between(from, to);
                 let (range, twin) = (stretch.range(&over), stretch.twin().range(&over));
                 assert!(range.lo.is_finite() && range.hi.is_finite(), "{formula}: nothing is known");
                 for _ in 0..10 {
-                    let part = DVec3::from_array(std::array::from_fn(|_| random.next()));
+                    let part = DVec3::from_array(std::array::from_fn(|_| random.unit()));
                     let p = (over.min + part * over.size()).clamp(over.min, over.max);
                     let now = solid.at(random.within(from, to).clamp(from, to));
                     assert!(range.contains(now.omega(p)), "{formula}: {} not in {range:?}", now.omega(p));
@@ -178,7 +161,7 @@ fn paths_enter_a_flying_ball_where_algebra_says() {
     let mut random = Random(11);
     let mut hits = 0;
     for _ in 0..20_000 {
-        let (from, to) = (random.point(1.5), random.point(1.5));
+        let (from, to) = (random.around(1.5), random.around(1.5));
         let begin = random.within(-0.5, 0.5);
         let end = begin + random.within(0.0, 1.0);
         let (a, z) = (from - centre(begin), to - centre(end));
@@ -215,7 +198,7 @@ fn paths_meet_a_swinging_plane_where_its_distance_vanishes() {
     let mut random = Random(13);
     let mut hits = 0;
     for _ in 0..2_000 {
-        let (from, to) = (random.point(1.0), random.point(1.0));
+        let (from, to) = (random.around(1.0), random.around(1.0));
         let begin = random.within(-1.0, 1.0);
         let end = begin + random.within(0.0, 1.5);
         let height = |s: f64| from.z + (to.z - from.z) * s - 0.3 * (5.0 * (begin + (end - begin) * s)).sin();
@@ -257,10 +240,10 @@ fn no_path_slips_through_a_turning_blade() {
     let mut random = Random(17);
     let mut hits = 0;
     for _ in 0..4_000 {
-        let (from, to) = (random.point(1.0), random.point(1.0));
+        let (from, to) = (random.around(1.0), random.around(1.0));
         let begin = random.within(0.0, 1.0);
         // one step makes up to a whole turn
-        let end = begin + random.next().powi(2);
+        let end = begin + random.unit().powi(2);
         let path = Path::new(from, to, f64::INFINITY);
         let found = blade.during(begin, end).first_entry(&path);
         let until = found.map_or(1.0, |entry| entry.t);
@@ -285,12 +268,12 @@ fn a_fast_thin_plate_meets_every_point_at_rest() {
     let step = plate.during(0.0, 0.5);
     let mut random = Random(19);
     for _ in 0..5_000 {
-        let p = random.point(0.99) + DVec3::X * random.within(-28.0, 28.0);
+        let p = random.around(0.99) + DVec3::X * random.within(-28.0, 28.0);
         let entry = step.first_entry(&Path::new(p, p, f64::INFINITY)).expect("the plate has passed");
         let expected = (p.x - 0.0005 + 30.0) / 60.0;
         assert!((entry.t - expected).abs() < 1e-9, "{} {expected}", entry.t);
         assert!(entry.normals.mean().unwrap().distance(DVec3::X) < 1e-9);
-        let beside = p.with_z(1.0 + 0.01 + random.next());
+        let beside = p.with_z(1.0 + 0.01 + random.unit());
         assert!(step.first_entry(&Path::new(beside, beside, f64::INFINITY)).is_none());
     }
 }
@@ -309,7 +292,7 @@ fn the_wall_of_a_turning_blade_moves_as_a_rigid_body() {
         let now = blade.at(time);
         let turn = glam::DQuat::from_axis_angle(axis, 3.0 * time);
         // on a face, away from its edges
-        let face = (random.next() * 6.0) as usize;
+        let face = (random.unit() * 6.0) as usize;
         let mut q = DVec3::from_array(std::array::from_fn(|i| random.within(-0.9, 0.9) * BLADE[i]));
         let mut normal = DVec3::ZERO;
         normal[face / 2] = if face.is_multiple_of(2) { 1.0 } else { -1.0 };
@@ -400,7 +383,7 @@ fn a_moving_map_has_the_sign_of_the_solid_in_every_step() {
         let (from, to) = (f64::from(step) * dt, f64::from(step + 1) * dt);
         let (now, cells) = (solid.at(to), map.between(from, to).expect("within the run"));
         for _ in 0..60 {
-            let p = random.point(1.5);
+            let p = random.around(1.5);
             assert_eq!(cells.sign(p), now.sign(p), "{p} at {to}");
             assert_eq!(cells.sign(p), cells.omega(p).signum());
             let contact = cells.contact(p);
@@ -430,7 +413,7 @@ fn a_moving_map_finds_the_entries_of_the_solid() {
     for _ in 0..600 {
         let from = random.within(0.0, 2.9);
         let to = from + random.within(0.0, 0.1);
-        let path = Path::new(random.point(1.4), random.point(1.4), f64::INFINITY);
+        let path = Path::new(random.around(1.4), random.around(1.4), f64::INFINITY);
         let (slow, fast) =
             (solid.during(from, to).first_entry(&path), map.during(from, to).first_entry(&path));
         match (slow, fast) {
@@ -453,7 +436,7 @@ fn the_answer_of_a_map_does_not_depend_on_the_steps_before() {
     }
     let [a, b] = maps.each_ref().map(|map| map.between(1.0, 1.01).unwrap());
     let mut random = Random(37);
-    let points: Vec<DVec3> = (0..2_000).map(|_| random.point(1.5)).collect();
+    let points: Vec<DVec3> = (0..2_000).map(|_| random.around(1.5)).collect();
     // nor on the order of questions, for which cells are divided
     let answer = |map: &CellMap, p: DVec3| (map.place_of(p), map.omega(p).to_bits());
     let of_a: Vec<_> = points.iter().map(|&p| answer(&a, p)).collect();
@@ -474,7 +457,7 @@ fn a_map_of_one_time_is_that_of_the_solid_then() {
     let map = CellMap::with_reach(&solid, unit_box(), 0.02).unwrap();
     let mut random = Random(41);
     for _ in 0..5_000 {
-        let p = random.point(1.5);
+        let p = random.around(1.5);
         assert_eq!(map.sign(p), solid.sign(p));
         assert!(map.place_of(p) != Place::Fluid || solid.contact(p).distance > 0.02 - 1e-9);
     }
@@ -490,7 +473,7 @@ fn certificates_hold_at_the_time_they_are_for() {
         let chosen = now.within(tolerance, over).unwrap();
         let (graph, root) = now.formula();
         for _ in 0..300 {
-            let p = random.point(2.0);
+            let p = random.around(2.0);
             let truth = exact::evaluate_at(graph, &[root], p.to_array(), time).unwrap().remove(0);
             assert!(truth.error_of(chosen.omega(p)) <= chosen.bound(), "{:?}", chosen.variant());
         }

@@ -3,18 +3,7 @@
 use rfm::Program;
 use rfm::glam::{DVec2, DVec3};
 
-struct Random(u64);
-
-impl Random {
-    fn unit(&mut self) -> f64 {
-        self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-        (self.0 >> 11) as f64 / (1u64 << 53) as f64
-    }
-
-    fn place(&mut self) -> DVec2 {
-        DVec2::new(self.unit(), self.unit())
-    }
-}
+use crate::random::Random;
 
 fn crosses([a, b]: [DVec2; 2], [c, d]: [DVec2; 2]) -> bool {
     let side = |p: DVec2, q: DVec2, r: DVec2| (q - p).perp_dot(r - p);
@@ -23,7 +12,7 @@ fn crosses([a, b]: [DVec2; 2], [c, d]: [DVec2; 2]) -> bool {
 
 /// Random corners joined by a tour that is untangled, crossing by crossing, until it is simple.
 fn tangle(corners: usize, random: &mut Random) -> Vec<DVec2> {
-    let mut points: Vec<DVec2> = (0..corners).map(|_| random.place()).collect();
+    let mut points: Vec<DVec2> = (0..corners).map(|_| random.in_square()).collect();
     let mut changed = true;
     while changed {
         changed = false;
@@ -91,12 +80,12 @@ fn check(points: &[DVec2], samples: usize, random: &mut Random) {
     for i in 0..samples {
         // in the box, about it, and close to an edge
         let p = match i % 3 {
-            0 => random.place(),
-            1 => random.place() * 3.0 - DVec2::ONE,
+            0 => random.in_square(),
+            1 => random.in_square() * 3.0 - DVec2::ONE,
             _ => {
                 let at = (random.unit() * points.len() as f64) as usize % points.len();
                 let edge = points[at].lerp(points[(at + 1) % points.len()], random.unit());
-                edge + (random.place() - DVec2::splat(0.5)) * 1e-6
+                edge + (random.in_square() - DVec2::splat(0.5)) * 1e-6
             }
         };
         let away = distance(p, points);

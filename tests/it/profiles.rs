@@ -11,6 +11,8 @@ use rfm::lower::Options;
 use rfm::solid::Bounds;
 use rfm::{Engine, Program, Solid};
 
+use crate::random::Random;
+
 /// One file, whatever its name.
 struct OneFile(String);
 
@@ -38,19 +40,6 @@ fn mistake(definition: &str) -> String {
     }
 }
 
-struct Random(u64);
-
-impl Random {
-    fn unit(&mut self) -> f64 {
-        self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-        (self.0 >> 11) as f64 / (1u64 << 53) as f64
-    }
-
-    fn within(&mut self, over: &Aabb) -> DVec3 {
-        over.min + over.size() * DVec3::new(self.unit(), self.unit(), self.unit())
-    }
-}
-
 /// The sign of a profile is that of a distance from the true outline, but for points closer to it than a
 /// tolerance; each tolerance is needed: somewhere the chords are a tenth of it away.
 #[track_caller]
@@ -60,7 +49,7 @@ fn follows(definition: &str, truth: impl Fn(DVec2) -> f64, tolerance: f64) {
     let over = Aabb::new(DVec3::new(-4.0, -4.0, 0.0), DVec3::new(4.0, 4.0, 1.0));
     let (mut near, mut farthest) = (0, 0.0);
     for i in 0..20_000 {
-        let mut p = random.within(&over);
+        let mut p = random.in_box(&over);
         if i % 2 == 0 {
             // towards the outline
             for _ in 0..8 {
@@ -160,7 +149,7 @@ fn curved_profiles_are_turned_and_extruded() {
     let ball = solid("polygon([arc([0, 0], 2, -90°, 90°), [-0.1, 2], [-0.1, -2]]).revolve()");
     let disc = solid("polygon(arc([0.5, 0], 1.5, 0°, 360°)).extrude(-1, 2)");
     for _ in 0..50_000 {
-        let p = random.within(&over);
+        let p = random.in_box(&over);
         let to_ball = 2.0 - p.length();
         let to_disc = (1.5 - DVec2::new(p.x - 0.5, p.y).length()).min((p.z + 1.0).min(2.0 - p.z));
         for (found, truth) in [(&ball, to_ball), (&disc, to_disc)] {
@@ -179,7 +168,7 @@ fn a_file_of_points_is_an_outline() {
     let found = with_file("polygon(spline(points(\"half.csv\")*2)).extrude(0, 1)", &rows, Engine::Auto);
     let mut random = Random(11);
     for _ in 0..20_000 {
-        let p = random.within(&Aabb::new(DVec3::new(-2.5, -1.0, 0.1), DVec3::new(2.5, 2.5, 0.9)));
+        let p = random.in_box(&Aabb::new(DVec3::new(-2.5, -1.0, 0.1), DVec3::new(2.5, 2.5, 0.9)));
         // the ends of an open spline are straight, so it is a little off there
         let truth = (2.0 - p.truncate().length()).min(p.y);
         if truth.abs() > 0.02 {
@@ -210,13 +199,13 @@ fn tubes_are_all_points_near_their_path() {
     let straight = vec![DVec3::ZERO, DVec3::Z, DVec3::new(0.0, 2.0, 1.0), DVec3::new(0.0, 2.0, -1.0)];
     let mut paths = vec![straight];
     for count in [2, 3, 7, 50] {
-        paths.push((0..count).map(|_| 0.7 * random.within(&over)).collect());
+        paths.push((0..count).map(|_| 0.7 * random.in_box(&over)).collect());
     }
     for path in paths {
         let radius = 0.1 + 0.2 * random.unit();
         let found = solid(&format!("sweep({}, {radius})", written(&path)));
         for i in 0..20_000 {
-            let mut p = random.within(&over);
+            let mut p = random.in_box(&over);
             if i % 2 == 0 {
                 // close to the surface
                 let at = (random.unit() * (path.len() - 1) as f64) as usize;
@@ -254,7 +243,7 @@ fn a_helix_is_a_tube_around_its_line() {
         .collect();
     let mut random = Random(17);
     for _ in 0..300 {
-        let p = random.within(&Aabb::new(DVec3::new(-1.2, -1.2, -0.2), DVec3::new(1.2, 1.2, 1.7)));
+        let p = random.in_box(&Aabb::new(DVec3::new(-1.2, -1.2, -0.2), DVec3::new(1.2, 1.2, 1.7)));
         let truth = 0.1 - distance(p, &exact);
         if truth.abs() > 1.01e-3 {
             assert_eq!(spring.omega(p) > 0.0, truth > 0.0, "{p}");
@@ -275,7 +264,7 @@ fn a_loft_between_circles_is_a_cone() {
     let mut random = Random(19);
     let over = Aabb::new(DVec3::splat(-2.5), DVec3::splat(2.5));
     for _ in 0..20_000 {
-        let mut p = random.within(&over);
+        let mut p = random.in_box(&over);
         let wall = |p: DVec3| (1.5 - 0.5 * p.z - p.truncate().length()) / 1.25f64.sqrt();
         let truth = wall(p).min(p.z + 1.0).min(1.0 - p.z);
         if truth.abs() > 1e-9 {
@@ -309,7 +298,7 @@ fn a_loft_weighs_two_outlines() {
     let mut random = Random(23);
     let mut compared = 0;
     for _ in 0..20_000 {
-        let p = random.within(&bounds.grown(0.3));
+        let p = random.in_box(&bounds.grown(0.3));
         let s = ((p.z - 0.5) / 1.5).clamp(0.0, 1.0);
         let side = (1.0 - s) * a.omega(p) + s * b.omega(p);
         let truth = side.min(p.z - 0.5).min(2.0 - p.z);
@@ -338,7 +327,7 @@ fn corners_are_rounded() {
     let bend = solid("sweep(rounded([[-2, 0, 0], [0, 0, 0], [0, 0, 2]], 1), 0.3)");
     let mut random = Random(29);
     for _ in 0..20_000 {
-        let p = random.within(&Aabb::new(DVec3::new(-2.4, -0.5, -0.5), DVec3::new(0.5, 0.5, 2.4)));
+        let p = random.in_box(&Aabb::new(DVec3::new(-2.4, -0.5, -0.5), DVec3::new(0.5, 0.5, 2.4)));
         // two straight pieces and a quarter of a torus around [-1, ·, 1]
         let line = match p {
             p if p.x < -1.0 => distance(p, &[DVec3::new(-2.0, 0.0, 0.0), DVec3::new(-1.0, 0.0, 0.0)]),
@@ -422,7 +411,7 @@ fn letters_have_the_outlines_of_the_font() {
         let found = solid(&format!("text(\"{quoted}\", 1)"));
         let mut inside = 0;
         for _ in 0..1500 {
-            let p = random.within(&Aabb::new(DVec3::new(-0.1, -0.4, 0.0), DVec3::new(1.4, 1.4, 1.0)));
+            let p = random.in_box(&Aabb::new(DVec3::new(-0.1, -0.4, 0.0), DVec3::new(1.4, 1.4, 1.0)));
             let (turns, away) = turns_around(p.truncate(), &chords.contours);
             if away > 1.1e-3 {
                 let omega = found.omega(p);
@@ -435,7 +424,7 @@ fn letters_have_the_outlines_of_the_font() {
     let advance = scale * f64::from(face.glyph_hor_advance(face.glyph_index('H').unwrap()).unwrap());
     let (two, one) = (solid("text(\"HH\", 2)"), solid("text(\"H\", 1).scale(2)"));
     for _ in 0..5000 {
-        let p = random.within(&Aabb::new(DVec3::new(-0.1, -0.4, 0.0), DVec3::new(5.0, 2.4, 1.0)));
+        let p = random.in_box(&Aabb::new(DVec3::new(-0.1, -0.4, 0.0), DVec3::new(5.0, 2.4, 1.0)));
         let truth = one.omega(p).max(one.omega(p - 2.0 * advance * DVec3::X));
         if truth.abs() > 1e-9 {
             assert_eq!(two.omega(p) > 0.0, truth > 0.0, "{p}");

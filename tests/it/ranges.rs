@@ -9,6 +9,8 @@ use rfm::simplify::simplify;
 use rfm::solid::{CellMap, Place, RangeProgram};
 use rfm::{Engine, Field, Program, Solid};
 
+use crate::random::Random;
+
 const MORE: &str = "rfm 1
 solid mixed = (torus(1, 0.3).rotate_x(0.4) or cone(1, 2) \\ cylinder(0.3, 3)) and abs(x - y/3) <= 2 - z
   or capsule(0.2, 1).move([1, 1, 0]) or x*y*z <= -1 and 2*x^3 - x*y + 0.1 >= z/7 and -1.5 <= x + y <= 2
@@ -27,14 +29,7 @@ fn solids() -> Vec<[Solid; 2]> {
     .into()
 }
 
-struct Random(u64);
-
 impl Random {
-    fn unit(&mut self) -> f64 {
-        self.0 = self.0.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
-        (self.0 >> 11) as f64 / (1u64 << 53) as f64
-    }
-
     /// A box of any size from 1e-9 to 10 somewhere within 5 of the origin; some are flat or single points.
     fn aabb(&mut self) -> Aabb {
         let size = 10f64.powf(10.0 * self.unit() - 9.0);

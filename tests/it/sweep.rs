@@ -8,6 +8,8 @@ use rfm::ir::exact;
 use rfm::solid::{CellMap, ProgramKind};
 use rfm::{Engine, Field, Program, Solid};
 
+use crate::random::Random;
+
 /// What is swept: the paper's obstacles, leaves that are not polynomials, and parts that are thin or touch
 /// each other.
 const SHAPES: &str = "rfm 1
@@ -29,19 +31,6 @@ const NAMES: [&str; 12] = [
     "ring", "cap", "pill", "balls", "shell", "plates", "tangent", "waves", "mixed", "egg", "quartic",
     "rounded",
 ];
-
-pub(crate) struct Random(pub u64);
-
-impl Random {
-    pub(crate) fn unit(&mut self) -> f64 {
-        self.0 = self.0.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
-        (self.0 >> 11) as f64 / (1u64 << 53) as f64
-    }
-
-    pub(crate) fn vector(&mut self) -> DVec3 {
-        2.0 * DVec3::new(self.unit(), self.unit(), self.unit()) - 1.0
-    }
-}
 
 fn solid(definition: &str) -> Solid {
     let program = Program::from_source("t.rfm", format!("rfm 1\nsolid s = {definition}"));
@@ -103,8 +92,8 @@ fn random_paths_miss_nothing() {
         let (mut hits, mut uncertain) = (0, 0);
         for k in 0..2_000 {
             let length = [3.0, 1.0, 0.1, 0.01][k % 4];
-            let from = coarse(middle + 1.2 * random.vector());
-            let to = coarse(from + length * random.vector());
+            let from = coarse(middle + 1.2 * random.around(1.0));
+            let to = coarse(from + length * random.around(1.0));
             let found = solid.first_entry(from, to);
             judge(&solid, from, to, found, &mut (0..=512).map(|i| f64::from(i) / 512.0));
             let Some(entry) = found else { continue };
@@ -128,10 +117,10 @@ fn grazing_paths_miss_nothing() {
         let mut touched = 0;
         let mut missed = 0;
         while touched + missed < 300 {
-            let (a, b) = (middle + 1.2 * random.vector(), middle + 1.2 * random.vector());
+            let (a, b) = (middle + 1.2 * random.around(1.0), middle + 1.2 * random.around(1.0));
             let Some(entry) = solid.first_entry(a, b).filter(|e| e.t > 0.0 && e.certain) else { continue };
             let Some(normal) = entry.normals.mean() else { continue };
-            let Some(tangent) = normal.cross(random.vector()).try_normalize() else { continue };
+            let Some(tangent) = normal.cross(random.around(1.0)).try_normalize() else { continue };
             let offset = 10f64.powf(-3.0 - 12.0 * random.unit()) * (2.0 * random.unit() - 1.0);
             let centre = coarse(entry.point) + offset * normal;
             let half = 0.3 * random.unit();
@@ -216,8 +205,8 @@ fn every_engine_and_view_finds_the_same_entry() {
         let map = CellMap::new(jit, box_).unwrap();
         let mut hits = 0;
         for k in 0..500 {
-            let from = *middle + 1.3 * random.vector();
-            let to = from + [2.0, 0.2, 0.02, 0.002][k % 4] * random.vector();
+            let from = *middle + 1.3 * random.around(1.0);
+            let to = from + [2.0, 0.2, 0.02, 0.002][k % 4] * random.around(1.0);
             let found = jit.first_entry(from, to);
             assert_eq!(found, plain.first_entry(from, to), "{jit:?}");
             let by_map = map.first_entry(&Path::new(from, to, 1.0));

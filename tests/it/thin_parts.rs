@@ -5,6 +5,8 @@ use rfm::glam::DVec3;
 use rfm::mesh::{Grid, Mesh, Resolution, ThinCells, Unwatched, marching_cubes, thin_cells};
 use rfm::{Engine, Program, Solid};
 
+use crate::random::Random;
+
 fn solid(text: &str) -> Solid {
     let program = Program::from_source("t.rfm", format!("rfm 1\nsolid s = {text}"));
     program.unwrap_or_else(|e| panic!("{text}: {e}")).solid_with("s", Engine::Auto).unwrap()
@@ -52,19 +54,7 @@ fn tips_and_rims_of_what_the_grid_shows_are_told_from_thin_parts() {
     }
 }
 
-/// A small generator (Knuth's linear congruence).
-struct Random(u64);
-
 impl Random {
-    fn unit(&mut self) -> f64 {
-        self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-        (self.0 >> 11) as f64 / (1_u64 << 53) as f64
-    }
-
-    fn within(&mut self, low: f64, high: f64) -> f64 {
-        low + (high - low) * self.unit()
-    }
-
     fn direction(&mut self) -> DVec3 {
         loop {
             let v = DVec3::from_array([(); 3].map(|()| self.within(-1.0, 1.0)));

@@ -6,6 +6,7 @@ use rfm::ir::exact;
 use rfm::solid::{Chosen, ProgramVariant};
 use rfm::{Engine, Field, Program, field::Points};
 
+use crate::random::Random;
 use crate::tool::{rfm, rfm_reading, root, snapshot};
 
 const THREE: &str = "rfm 1
@@ -35,12 +36,8 @@ fn chosen(text: &str, name: &str, engine: Engine) -> Chosen {
 }
 
 fn random_points(over: &Aabb, count: usize) -> Vec<DVec3> {
-    let mut seed = 7u64;
-    let mut random = || {
-        seed = seed.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
-        (seed >> 11) as f64 / (1u64 << 53) as f64
-    };
-    (0..count).map(|_| over.min + over.size() * DVec3::new(random(), random(), random())).collect()
+    let mut random = Random(7);
+    (0..count).map(|_| random.in_box(over)).collect()
 }
 
 #[test]

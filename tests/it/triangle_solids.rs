@@ -11,6 +11,8 @@ use rfm::mesh::{Grid, Resolution, Unwatched, check, dual_contouring, marching_cu
 use rfm::source::{self, Target};
 use rfm::{Engine, Program, Solid};
 
+use crate::random::Random;
+
 type Soup = Vec<[DVec3; 3]>;
 
 /// One file, whatever its name.
@@ -112,19 +114,6 @@ fn pawn(cells: usize) -> Soup {
     mesh.triangles.iter().map(|t| t.map(corner)).collect()
 }
 
-struct Random(u64);
-
-impl Random {
-    fn unit(&mut self) -> f64 {
-        self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-        (self.0 >> 11) as f64 / (1u64 << 53) as f64
-    }
-
-    fn place(&mut self) -> DVec3 {
-        DVec3::new(self.unit(), self.unit(), self.unit()) * 3.0
-    }
-}
-
 const HOLES: &str = "solid part = mesh(\"part.stl\") \\ cylinder(0.15, 3).move([1.5, 1.5, -1])
   \\ any i in 0..3: ball([1.5 + 0.4*cos(2*pi*i/3), 1.5 + 0.4*sin(2*pi*i/3), 0.3], 0.18)";
 
@@ -134,7 +123,7 @@ fn all_formats_give_the_same_solid() {
     let at = |name: &str, file: Vec<u8>| {
         let solid = program(&format!("solid part = mesh(\"{name}\")"), file).solid("part").unwrap();
         let mut random = Random(3);
-        (0..200).map(|_| solid.omega(random.place()).to_bits()).collect::<Vec<u64>>()
+        (0..200).map(|_| solid.omega(random.in_cube() * 3.0).to_bits()).collect::<Vec<u64>>()
     };
     let expected = at("a.stl", binary_stl(&soup));
     for (name, file) in [
@@ -155,7 +144,7 @@ fn a_unit_scales_the_solid() {
     let in_mm = program("solid s = mesh(\"a.stl\", 1 mm)", binary_stl(&soup)).solid("s").unwrap();
     let mut random = Random(4);
     for _ in 0..200 {
-        let p = random.place();
+        let p = random.in_cube() * 3.0;
         assert!((in_metres.omega(p) - 1e3 * in_mm.omega(p * 1e-3)).abs() < 1e-12);
     }
 }
@@ -170,7 +159,7 @@ fn programs_are_the_interpreter() {
             [Engine::Jit, Engine::Interpreter].map(|engine| program.solid_with(name, engine).unwrap());
         let mut random = Random(9);
         let points: Vec<DVec3> =
-            (0..401).map(|_| random.place()).chain([DVec3::NAN, DVec3::INFINITY]).collect();
+            (0..401).map(|_| random.in_cube() * 3.0).chain([DVec3::NAN, DVec3::INFINITY]).collect();
         let same = |a: f64, b: f64| a.to_bits() == b.to_bits() || a.is_nan() && b.is_nan() || a == b;
         let axes: [Vec<f64>; 3] = std::array::from_fn(|i| points.iter().map(|p| p[i]).collect());
         let columns = axes.each_ref().map(|axis| &axis[..]);
@@ -216,7 +205,7 @@ fn gradients_are_differences_and_ranges_hold_all_values() {
     let mut random = Random(2);
     let mut far = 0;
     for _ in 0..3000 {
-        let p = random.place();
+        let p = random.in_cube() * 3.0;
         let (_, gradient) = solid.omega_grad(p);
         let h = 1e-6;
         let difference = DVec3::from_array(
@@ -225,7 +214,7 @@ fn gradients_are_differences_and_ranges_hold_all_values() {
         );
         // but where the nearest triangle or the deciding leaf changes between the points
         far += usize::from((gradient - difference).length() > 1e-5);
-        let over = Aabb::new(p, p + random.place() * random.unit() * 0.2);
+        let over = Aabb::new(p, p + random.in_cube() * 3.0 * random.unit() * 0.2);
         let range = solid.range(&over);
         for _ in 0..5 {
             let part = DVec3::new(random.unit(), random.unit(), random.unit());
@@ -244,7 +233,7 @@ fn contacts_are_distances_from_the_mesh() {
         .unwrap();
     let mut random = Random(6);
     for _ in 0..1000 {
-        let p = random.place();
+        let p = random.in_cube() * 3.0;
         let contact = solid.contact(p);
         assert!((contact.distance + solid.omega(p)).abs() < 1e-12, "{p}");
         assert!((contact.normal.length() - 1.0).abs() < 1e-9);
@@ -318,7 +307,7 @@ fn points_in_single_precision_are_near() {
     let solid = program("solid part = mesh(\"part.stl\")", binary_stl(&pawn(12))).solid("part").unwrap();
     let mut random = Random(8);
     for _ in 0..300 {
-        let p: Vec3 = random.place().as_vec3();
+        let p: Vec3 = (random.in_cube() * 3.0).as_vec3();
         assert!((f64::from(solid.omega_f32(p)) - solid.omega(p.as_dvec3())).abs() < 1e-6);
     }
 }
@@ -341,7 +330,11 @@ fn a_hundred_thousand_triangles_are_quick() {
     let mut random = Random(1);
     let mut axes = [(); 3].map(|()| Vec::new());
     for i in 0..1_000_000 {
-        let p = if i % 2 == 0 { random.place() } else { DVec3::new(1.5, 1.5, 0.0) + 0.4 * random.place() };
+        let p = if i % 2 == 0 {
+            random.in_cube() * 3.0
+        } else {
+            DVec3::new(1.5, 1.5, 0.0) + 0.4 * (random.in_cube() * 3.0)
+        };
         axes.iter_mut().zip(p.to_array()).for_each(|(axis, c)| axis.push(c));
     }
     let mut omega = vec![0.0; axes[0].len()];

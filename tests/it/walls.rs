@@ -11,7 +11,7 @@ use rfm::lower::Scene;
 use rfm::sph::{Obstacle, Paper, Parameters, Particles, Simulation};
 use rfm::{Engine, Experiment, Program, Solid};
 
-use crate::sweep::Random;
+use crate::random::Random;
 
 /// Hollow bodies with a wall of 1e-6, and the hollows inside them.
 const SHELLS: &str = "rfm 1
@@ -40,7 +40,7 @@ fn fly(field: Arc<dyn Walls>, starts: &[DVec3], steps: usize, check: &dyn Fn(DVe
     let mut random = Random(17);
     let mut fluid = Particles::default();
     for &start in starts {
-        fluid.push(start, 100.0 * random.vector().normalize());
+        fluid.push(start, 100.0 * random.around(1.0).normalize());
     }
     let parameters = Parameters {
         method: Paper { stiffness: 0.0, ..Paper::default() }.into(),
@@ -72,7 +72,7 @@ fn fly(field: Arc<dyn Walls>, starts: &[DVec3], steps: usize, check: &dyn Fn(DVe
 
 fn starts(count: usize, fits: impl Fn(DVec3) -> bool) -> Vec<DVec3> {
     let mut random = Random(4);
-    std::iter::from_fn(|| Some(random.vector())).filter(|p| fits(*p)).take(count).collect()
+    std::iter::from_fn(|| Some(random.around(1.0))).filter(|p| fits(*p)).take(count).collect()
 }
 
 #[test]

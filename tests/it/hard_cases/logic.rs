@@ -2,6 +2,7 @@
 
 use super::{Case, case, check_all, sign};
 use crate::numbers::{near, solid};
+use crate::random::Random;
 use rfm::Field;
 use rfm::geom::Aabb;
 use rfm::glam::{DVec3, Vec3};
@@ -201,17 +202,17 @@ fn rows_41_and_42_de_morgan_and_order_bit_for_bit() {
         ("x or y", "y or x"),
     ];
     let pairs = pairs.map(|(a, b)| (solid(a), solid(b)));
-    let mut seed = 5u64;
-    let mut random = || {
-        seed = seed.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
-        seed ^ (seed >> 29)
+    let mut random = Random(5);
+    let mut bits = || {
+        let state = random.bits();
+        state ^ (state >> 29)
     };
     let same =
         |a: f64, b: f64| a.to_bits() == b.to_bits() || (a == 0.0 && b == 0.0) || (a.is_nan() && b.is_nan());
     for i in 0..20_000 {
-        let u = f64::from_bits(random());
+        let u = f64::from_bits(bits());
         // every third pair is a tie of magnitudes
-        let v = if i % 3 == 0 { -u } else { f64::from_bits(random()) };
+        let v = if i % 3 == 0 { -u } else { f64::from_bits(bits()) };
         if !(u.is_finite() && v.is_finite()) {
             continue;
         }

@@ -8,6 +8,7 @@ use rfm::solid::Lane;
 
 use super::library::Library;
 use crate::agreement::same;
+use crate::random::Random;
 
 /// What was compared.
 #[derive(Debug, Clone, Copy, Default)]
@@ -41,18 +42,14 @@ impl Extra {
 
 /// Points around the origin, and some of them at awkward places.
 pub fn points(count: usize, seed: u64) -> [Vec<f64>; 3] {
-    let mut state = seed.wrapping_mul(0x9e37_79b9_7f4a_7c15) + 1;
-    let mut random = || {
-        state = state.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
-        (state >> 11) as f64 / (1u64 << 53) as f64
-    };
+    let mut random = Random(seed.wrapping_mul(0x9e37_79b9_7f4a_7c15) + 1);
     const AWKWARD: [f64; 14] =
         [0.0, -0.0, 1.0, -1.0, 0.5, 1.5, 3.0, 1e-8, 1e-160, 1e150, -1e6, f64::NAN, f64::INFINITY, 5e-324];
     let mut coordinate = || {
-        if random() < 0.05 {
-            AWKWARD[(random() * AWKWARD.len() as f64) as usize]
+        if random.unit() < 0.05 {
+            AWKWARD[(random.unit() * AWKWARD.len() as f64) as usize]
         } else {
-            6.0 * random() - 3.0
+            6.0 * random.unit() - 3.0
         }
     };
     std::array::from_fn(|_| (0..count).map(|_| coordinate()).collect())
