@@ -12,13 +12,8 @@ use crate::sph::{KeyBlock, Method};
 use crate::syntax::ast::{Entry, Expr, ExprKind, Name};
 use crate::syntax::foreign;
 
-/// Keys that are often looked for one block too far out.
-const INNER: [(&str, &[&str]); 4] = [
-    ("picture", &["camera", "look_at", "zoom", "cut", "hide", "glass"]),
-    ("run", &["until", "save_every", "checkpoint_every", "dt"]),
-    ("fluid", &["density", "viscosity", "spacing", "particles", "shape", "surface_tension"]),
-    ("solver", &["precision"]),
-];
+/// Blocks whose keys are often looked for one block too far out.
+const INNER: [&str; 4] = ["picture", "run", "fluid", "solver"];
 
 /// What there is to say to a kinematic viscosity.
 const DYNAMIC: &str =
@@ -118,12 +113,15 @@ impl<'a> Lowering<'a> {
                 let own = foreign::key(&key.text);
                 let elsewhere = own.filter(|own| known.contains(own));
                 let inner_key = own.unwrap_or(key.text.as_str());
-                let inner =
-                    INNER.iter().find(|(block, keys)| known.contains(block) && keys.contains(&inner_key));
+                let has_key = |keys: &[SceneKey]| names(keys).any(|name| name == inner_key);
+                let opens = |block: &&str| {
+                    declared.iter().any(|known| known.name == *block && known.block().is_some_and(has_key))
+                };
+                let inner = INNER.into_iter().find(opens);
                 let of_methods = [KeyBlock::Fluid, KeyBlock::Solver].into_iter().find(|block| {
                     known.contains(&block.name()) && !Method::with_key(*block, inner_key).is_empty()
                 });
-                let inner = inner.map(|(block, _)| *block).or(of_methods.map(KeyBlock::name));
+                let inner = inner.or(of_methods.map(KeyBlock::name));
                 let absent = ABSENT
                     .iter()
                     .find(|(block, keys, _)| *block == what && keys.contains(&key.text.as_str()));
