@@ -1,8 +1,8 @@
 //! The functions of the mathematical library that graphs may use: their names and their values.
 //!
 //! A function that is added here is known to the language, to the interpreter and to the code generator.
-//! `function_rules` holds its derivative, its range, its enclosure along a path, how it hands errors on, where
-//! it is infinite or undefined, and its true value. A few other places name functions one by one:
+//! `function_rules` holds its derivative, its range, its enclosure along a path, how it hands errors on,
+//! where it is infinite or undefined, and its true value. A few other places name functions one by one:
 //! `contraction` (forwards and backwards), the source of shaders and of the ray-marcher, the words of the
 //! language, and the C bindings.
 //!

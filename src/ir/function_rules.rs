@@ -190,8 +190,8 @@ impl UnaryFunction {
         }
     }
 
-    /// Whether its value may be infinite at a finite operand without an overflow. No double lies exactly at a pole of
-    /// the tangent.
+    /// Whether its value may be infinite at a finite operand without an overflow. No double lies exactly at a
+    /// pole of the tangent.
     pub(super) fn has_pole(self) -> bool {
         match self {
             Self::Ln | Self::Log2 | Self::Log10 => true,

@@ -10,8 +10,8 @@ use crate::ir::function::{BinaryFunction, UnaryFunction};
 use crate::ir::r0;
 use crate::ir::real::Real;
 
-/// Declares operations, one on each line: their variant and their name in dumps. Functions of the mathematical library are
-/// operations too.
+/// Declares operations, one on each line: their variant and their name in dumps. Functions of the
+/// mathematical library are operations too.
 macro_rules! operations {
     (
         $(#[$meta:meta])*
@@ -80,7 +80,8 @@ operations! {
         Mul "mul";
         /// a/b
         Div "div";
-        /// a/b, and 0 where b = 0: derivatives of roots at their singular point, where the limit set contains 0.
+        /// a/b, and 0 where b = 0: derivatives of roots at their singular point, where the limit set contains
+        /// 0.
         DivOrZero "div_or_zero";
         /// a·b, and 0 where b = 0 whatever a is, even if it is no number: b chooses whether a counts.
         MulOrZero "mul_or_zero";

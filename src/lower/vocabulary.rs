@@ -29,7 +29,8 @@ pub fn reserved() -> &'static [&'static str] {
     &RESERVED
 }
 
-/// All blocks with the keys that every method has, a block before those within it; `None` is the scene itself.
+/// All blocks with the keys that every method has, a block before those within it; `None` is the scene
+/// itself.
 pub fn blocks() -> Vec<(Option<&'static str>, &'static [SceneKey])> {
     fn add(
         name: Option<&'static str>,

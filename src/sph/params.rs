@@ -11,21 +11,23 @@ use crate::precision::Precision;
 use crate::quantity::Bound;
 
 /// The parameters of a fluid. [`Parameters::of`] fills them in for a method and a size of particles,
-/// [`Parameters::paper`] with table 1 of the paper. The default is water in the default method, in particles of 20 g.
+/// [`Parameters::paper`] with table 1 of the paper. The default is water in the default method, in particles
+/// of 20 g.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Parameters {
     /// Rest density ρ₀, kg/m³. 998.29: water at 20 °C (table 1).
     pub rest_density: f64,
-    /// Mass of one particle m, kg. With ρ₀ it fixes the spacing (m/ρ₀)^⅓: 27.2 mm for 0.02 (table 1) in water.
+    /// Mass of one particle m, kg. With ρ₀ it fixes the spacing (m/ρ₀)^⅓: 27.2 mm for 0.02 (table 1) in
+    /// water.
     pub particle_mass: f64,
-    /// Support radius h, m: every kernel is zero beyond it. By default it suits the method: 0.1 (table 1) for the paper's,
-    /// that is 3.7 spacings and some 200 neighbours, and fewer spacings for the others.
+    /// Support radius h, m: every kernel is zero beyond it. By default it suits the method: 0.1 (table 1) for
+    /// the paper's, that is 3.7 spacings and some 200 neighbours, and fewer spacings for the others.
     pub support_radius: f64,
-    /// Dynamic viscosity, Pa·s (the paper's ν). By default that of water; in the paper's method 3.5 (table 1), 3500
-    /// times as much. Zero: the pass does not run.
+    /// Dynamic viscosity, Pa·s (the paper's ν). By default that of water; in the paper's method 3.5 (table
+    /// 1), 3500 times as much. Zero: the pass does not run.
     pub viscosity: f64,
-    /// Surface tension σ, N/m. By default none; in the paper's method 0.0728 (table 1): water against air. Zero: the pass
-    /// does not run.
+    /// Surface tension σ, N/m. By default none; in the paper's method 0.0728 (table 1): water against air.
+    /// Zero: the pass does not run.
     pub surface_tension: f64,
     /// Gravity, m/s². (0, 0, −9.81). Zero: the pass does not run.
     pub gravity: DVec3,
@@ -35,9 +37,10 @@ pub struct Parameters {
     /// returns.
     pub wall_restitution: f64,
     /// Time step dt, s, or the longest one if steps are adaptive. For the paper's method 0.002: below
-    /// [`Parameters::stable_dt`] of the paper's scene (2.7 ms after a fall of 3 m), so that no particle crosses more than a sixth of its support in one step. The paper's own 0.01 is
-    /// three times the bound; in that scene, soft and viscous as it is, it still does not diverge, but loses
-    /// 3 % more energy in the first second.
+    /// [`Parameters::stable_dt`] of the paper's scene (2.7 ms after a fall of 3 m), so that no particle
+    /// crosses more than a sixth of its support in one step. The paper's own 0.01 is three times the bound;
+    /// in that scene, soft and viscous as it is, it still does not diverge, but loses 3 % more energy in the
+    /// first second.
     pub time_step: f64,
     /// Whether a step may be shorter than `time_step` where the state demands it, see
     /// [`Simulation::stable_dt`](super::Simulation::stable_dt).
@@ -81,9 +84,9 @@ impl Default for Parameters {
 }
 
 impl Parameters {
-    /// Water at 20 °C in particles with this spacing, m. Viscosity, surface tension, support radius, precision and steps
-    /// are the defaults of the method, as in a scene that states none of them. Walls let the fluid slip, and speeds up to
-    /// a fall of 3 m are expected.
+    /// Water at 20 °C in particles with this spacing, m. Viscosity, surface tension, support radius,
+    /// precision and steps are the defaults of the method, as in a scene that states none of them. Walls let
+    /// the fluid slip, and speeds up to a fall of 3 m are expected.
     pub fn of(method: impl Into<Method>, spacing: f64) -> Self {
         let method = method.into();
         let fluid = method.fluid();
@@ -240,7 +243,8 @@ impl Parameters {
         self.method.numerics().drag_is_too_large()
     }
 
-    /// The speed of sound that a scene states, with the speed that it must exceed; `None` if the scene states none.
+    /// The speed of sound that a scene states, with the speed that it must exceed; `None` if the scene states
+    /// none.
     pub(crate) fn stated_sound(&self) -> Option<StatedSound> {
         self.method.numerics().stated_sound(&self.scales())
     }

@@ -1,10 +1,10 @@
-//! No circles: files do not need each other in a ring, however long, and rooms (the files and folders of `src`)
-//! do not either.
+//! No circles: files do not need each other in a ring, however long, and rooms (the files and folders of
+//! `src`) do not either.
 //!
-//! A file needs what its `use` lines and the paths in its code name, be they of `crate`, `super`, `self` or a child.
-//! A name that a file re-exports leads to the file that defines it. A module inside another one may use what its
-//! parent defines, although the parent calls it: a small type at the top of a folder is at home there. Files that
-//! exist for tests alone are left out.
+//! A file needs what its `use` lines and the paths in its code name, be they of `crate`, `super`, `self` or a
+//! child. A name that a file re-exports leads to the file that defines it. A module inside another one may
+//! use what its parent defines, although the parent calls it: a small type at the top of a folder is at home
+//! there. Files that exist for tests alone are left out.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};

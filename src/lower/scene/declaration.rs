@@ -1,5 +1,6 @@
-//! How the keys of a scene are declared: once, beside their reader, with what they may hold, what holds without them
-//! and what they mean. The reader takes bounds and defaults from there, `rfm explain` and editors their texts.
+//! How the keys of a scene are declared: once, beside their reader, with what they may hold, what holds
+//! without them and what they mean. The reader takes bounds and defaults from there, `rfm explain` and
+//! editors their texts.
 //!
 //! Keys of methods are declared by the methods, see [`crate::sph`].
 

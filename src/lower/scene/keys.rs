@@ -208,7 +208,8 @@ impl<'a> Lowering<'a> {
         None
     }
 
-    /// Reads one of the words of a key, which have these meanings; `None` if the word is unknown, which is reported.
+    /// Reads one of the words of a key, which have these meanings; `None` if the word is unknown, which is
+    /// reported.
     pub(super) fn word_key<T: Copy>(
         &mut self,
         block: &Block<'_>,
@@ -222,8 +223,8 @@ impl<'a> Lowering<'a> {
         }
     }
 
-    /// Reads one of a few words, and returns its index. The outer option is `None` if the word is unknown, which is
-    /// reported; the inner one if the key is absent.
+    /// Reads one of a few words, and returns its index. The outer option is `None` if the word is unknown,
+    /// which is reported; the inner one if the key is absent.
     pub(super) fn one_word(&mut self, block: &Block<'_>, key: &str, words: &[&str]) -> Option<Option<usize>> {
         let Some((_, value)) = block.setting(key) else { return Some(None) };
         let found = match &value.kind {
@@ -241,14 +242,14 @@ impl<'a> Lowering<'a> {
         index.map(Some)
     }
 
-    /// Reads a number of a key that must be present or has a number without it; `None` if the number is absent, or wrong,
-    /// which is reported.
+    /// Reads a number of a key that must be present or has a number without it; `None` if the number is
+    /// absent, or wrong, which is reported.
     pub(in crate::lower) fn number_key(&mut self, block: &Block<'_>, key: &SceneKey) -> Option<f64> {
         self.stated_number(block, key)?.or(key.number_without())
     }
 
-    /// Reads a number, and checks its unit and bound. The outer option is `None` if it is wrong, which is reported; the
-    /// inner one if the key is absent.
+    /// Reads a number, and checks its unit and bound. The outer option is `None` if it is wrong, which is
+    /// reported; the inner one if the key is absent.
     pub(in crate::lower) fn stated_number(
         &mut self,
         block: &Block<'_>,
@@ -275,14 +276,14 @@ impl<'a> Lowering<'a> {
         None
     }
 
-    /// Reads a vector of a key that must be present or has a vector without it; `None` if the vector is absent, or wrong,
-    /// which is reported.
+    /// Reads a vector of a key that must be present or has a vector without it; `None` if the vector is
+    /// absent, or wrong, which is reported.
     pub(in crate::lower) fn vector_key(&mut self, block: &Block<'_>, key: &SceneKey) -> Option<DVec3> {
         self.stated_vector(block, key)?.or(key.vector_without())
     }
 
-    /// Reads a vector of finite numbers with a unit. The outer option is `None` if it is wrong, which is reported; the
-    /// inner one if the key is absent.
+    /// Reads a vector of finite numbers with a unit. The outer option is `None` if it is wrong, which is
+    /// reported; the inner one if the key is absent.
     pub(super) fn stated_vector(&mut self, block: &Block<'_>, key: &SceneKey) -> Option<Option<DVec3>> {
         self.vector_in(block, key.name, key.dimension())
     }
@@ -313,8 +314,8 @@ impl<'a> Lowering<'a> {
         None
     }
 
-    /// Reads the whole number of a key. The outer option is `None` if the number is wrong, which is reported; the inner
-    /// one if the key is absent and has no number without it.
+    /// Reads the whole number of a key. The outer option is `None` if the number is wrong, which is reported;
+    /// the inner one if the key is absent and has no number without it.
     pub(super) fn count_key(&mut self, block: &Block<'_>, key: &SceneKey) -> Option<Option<usize>> {
         let KeyValue::Count(least) = key.value else { return None };
         let stated = self.count_in(block, key.name, least)?;

@@ -2,9 +2,9 @@
 //!
 //! Invariant: after this stage every number is finite and in SI units, and every size is positive.
 //!
-//! This file has the data, [`read`] reads the blocks of a scene, [`fluid`] its fluid and method, [`run`] how long it
-//! runs, [`truth`] what is known of it, [`picture`] how it is drawn, and [`keys`] what a key may hold. The keys of a
-//! block are declared beside their reader, see [`declaration`].
+//! This file has the data, [`read`] reads the blocks of a scene, [`fluid`] its fluid and method, [`run`] how
+//! long it runs, [`truth`] what is known of it, [`picture`] how it is drawn, and [`keys`] what a key may
+//! hold. The keys of a block are declared beside their reader, see [`declaration`].
 
 pub(super) mod declaration;
 pub(super) mod fluid;

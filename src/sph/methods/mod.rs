@@ -2,8 +2,8 @@
 //! readable `step` over the stages of [`Core`](super::core::Core).
 //!
 //! To add a method: a folder with its numbers, their declaration and limits (`mod.rs`) and its scheme
-//! (`scheme.rs`), and here a `mod` line and a line in the list of methods. `rfm explain --methods` then writes
-//! the page beside it.
+//! (`scheme.rs`), and here a `mod` line and a line in the list of methods. `rfm explain --methods` then
+//! writes the page beside it.
 
 /// The list of all methods, in the order in which they are shown. It is handed to a macro.
 macro_rules! for_all_methods {
@@ -11,8 +11,8 @@ macro_rules! for_all_methods {
         $make! {
             /// Weakly compressible: density from the equation of continuity, pressure by Tait's equation.
             Wcsph,
-            /// Divergence-free (Bender & Koschier 2017): the pressure is solved for, so that the density stays
-            /// constant.
+            /// Divergence-free (Bender & Koschier 2017): the pressure is solved for, so that the density
+            /// stays constant.
             Dfsph,
             /// The method of the paper, equations 8–14, corrected.
             Paper,

@@ -31,11 +31,12 @@ pub(in crate::sph) trait Numerics: Sync {
     /// artificial viscosity. Rows of particles resist a shear about as much without it.
     fn numerical_viscosity(&self, scales: &Scales) -> f64;
 
-    /// Whether the drag of a body that moves through the fluid comes out several times too large, as it does with
-    /// pressures in pairs.
+    /// Whether the drag of a body that moves through the fluid comes out several times too large, as it does
+    /// with pressures in pairs.
     fn drag_is_too_large(&self) -> bool;
 
-    /// The speed of sound that a scene states, with the speed that it must exceed; `None` if the scene states none.
+    /// The speed of sound that a scene states, with the speed that it must exceed; `None` if the scene states
+    /// none.
     fn stated_sound(&self, _scales: &Scales) -> Option<StatedSound> {
         None
     }

@@ -6,8 +6,8 @@ use crate::sph::error::StepError;
 
 /// The numbers of a method, of which its scheme is made.
 pub(super) trait Start {
-    /// Makes the scheme of a fluid that is new, or that goes on from a state which will be restored, and finds
-    /// densities and forces of the first instant.
+    /// Makes the scheme of a fluid that is new, or that goes on from a state which will be restored, and
+    /// finds densities and forces of the first instant.
     fn start(self, core: &mut Core, is_new: bool) -> Box<dyn Scheme>;
 }
 

@@ -1,16 +1,16 @@
 //! Which scheme a method has.
 
+use super::Method;
 use super::scheme::{Scheme, Start};
-use super::{Dfsph, Method, Paper, Wcsph};
 use crate::sph::core::Core;
 
 macro_rules! start {
     ($($(#[$about:meta])* $method:ident),* $(,)?) => {
-        /// Makes the scheme of the core's method and finds densities and forces of the first instant. If the fluid
-        /// goes on from a checkpoint, those of the checkpoint replace them afterwards.
+        /// Makes the scheme of the core's method and finds densities and forces of the first instant. If the
+        /// fluid goes on from a checkpoint, those of the checkpoint replace them afterwards.
         pub(in crate::sph) fn start(core: &mut Core, is_new: bool) -> Box<dyn Scheme> {
             match core.parameters.method {
-                $(Method::$method(numbers) => <$method as Start>::start(numbers, core, is_new)),*
+                $(Method::$method(numbers) => numbers.start(core, is_new)),*
             }
         }
     };
