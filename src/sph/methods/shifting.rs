@@ -7,6 +7,11 @@
 //! they crowd to where there are few. The drift is not a motion of the fluid. A particle keeps what it
 //! carries (velocity, density); the error of that is of the order of the drift times the gradient.
 //!
+//! A compressed fluid has more particles where its pressure is higher, and they do not crowd there. With
+//! `wcsph` the sum is therefore Σ V(1 − (ρ_j − ρ₀)/ρ₀)∇W, with the densities that particles carry. (Without
+//! that the drift and the pressure move particles in a circle, and each round takes momentum from a fluid that
+//! turns.)
+//!
 //! The drift does not change densities that follow the motion, and the fluid's volume would stray: by 5 %
 //! within a few periods of a wave. In the depth of the fluid densities are therefore drawn to what the
 //! particles' places say, Σ m W, at the rate [`RETURN`]·U/h: slowly enough for the noise of that sum to

@@ -11,7 +11,7 @@ use super::super::{
     shifting::{depth, falling_rate, return_rate},
 };
 use super::Gradients;
-use super::numbers::{Numbers, at_rest, sums_crowding};
+use super::numbers::{Numbers, at_rest};
 use crate::sph::{
     core::Core,
     kernel::Wendland,
@@ -37,6 +37,15 @@ const LOOSE: f64 = 0.02;
 
 /// Least part of Σ V r⊗∇W along a direction by which a gradient is divided. In a corner particles have about a fifth.
 const LEAST_MOMENT: f64 = 0.1;
+
+/// Number of sums of [`Pairs`].
+const SUMS: usize = 16;
+
+/// Number of sums of [`Shifted`], which those of Σ f·d⊗d follow.
+const SHIFTED_SUMS: usize = SUMS + 3;
+
+/// Number of sums of [`Differences`].
+const DIFFERENCES_SUMS: usize = SHIFTED_SUMS + 5;
 
 /// How far a particle at a wall takes part in the balance of the fluid, 0 to 1, from its Σ V W.
 fn held(filled: f64) -> f64 {
@@ -75,8 +84,6 @@ pub(super) struct Rates<'a> {
     missing: &'a [f64],
     /// Σ V W on a lattice.
     lattice: f64,
-    /// Whether how particles crowd is summed, see [`sums_crowding`].
-    pub even: bool,
     /// Where what walls do is noted, if it is to be.
     reaction: Option<Reaction<'a>>,
 }
@@ -118,33 +125,31 @@ impl<'a> Rates<'a> {
             closing_rate: return_rate(core).max(falling_rate(core)),
             missing,
             lattice: Wendland::lattice_sum(parameters.support_radius / parameters.spacing()),
-            even: sums_crowding(numbers, core),
             reaction: Reaction::of(core, dt),
         }
     }
 }
 
-/// The pass over pairs, with laminar and artificial viscosity or without, and with how particles crowd
-/// or without. With f = (1 − q)³ and d from the neighbour it sums f·(p_j − p_i + Π)·d, f·(v_i − v_j)·d,
-/// f·(ρ_j − ρ_i), f·d, f·d², W, f·((v_j − v_i)·d)·d/d² and W·v_j; the artificial viscosity Π is that of rough velocities.
-/// Where how particles crowd is not summed it has p_j + p_i instead of p_j − p_i, and omits f·d and f·d².
+/// What the pass over pairs sums, with laminar and artificial viscosity or without, and with how particles
+/// crowd or without. With f = (1 − q)³ and d from the neighbour it sums f·(p_j − p_i + Π)·d, f·(v_i − v_j)·d,
+/// f·(ρ_j − ρ_i), f·d, f·d², W, f·((v_j − v_i)·d)·d/d² and W·v_j; the artificial viscosity Π is that of rough
+/// velocities. Where how particles crowd is not summed it has p_j + p_i instead of p_j − p_i, and omits f·d and
+/// f·d².
 #[derive(Clone, Copy)]
 pub(super) struct Pairs<'a, const LAMINAR: bool, const ARTIFICIAL: bool, const EVEN: bool>(pub Rates<'a>);
 
-impl<const LAMINAR: bool, const ARTIFICIAL: bool, const EVEN: bool> PairPass<8, 16, 13>
-    for Pairs<'_, LAMINAR, ARTIFICIAL, EVEN>
-{
+impl<const LAMINAR: bool, const ARTIFICIAL: bool, const EVEN: bool> Pairs<'_, LAMINAR, ARTIFICIAL, EVEN> {
     /// The artificial viscosity is a pressure between particles that approach, and a tension between those
     /// that part. With the pressure alone, noise at rest would hold up a part of the fluid's weight (3 % of
     /// it with α = 0.1).
     #[inline(always)]
-    fn add<S: Simd, V: SimdFloat<S, Element: Real>>(
+    fn sum<S: Simd, V: SimdFloat<S, Element: Real>>(
         &self,
         d: [V; 3],
         r2: V,
         own: &[V; 8],
-        other: [V; 8],
-        sums: &mut [V; 16],
+        other: &[V; 8],
+        sums: &mut [V; SUMS],
     ) {
         let of = V::Element::of;
         let rates = &self.0;
@@ -194,14 +199,15 @@ impl<const LAMINAR: bool, const ARTIFICIAL: bool, const EVEN: bool> PairPass<8, 
         }
     }
 
-    fn finish(&self, i: usize, sums: [f64; 16]) -> [f64; 13] {
-        self.with_moment(i, sums, None)
-    }
-}
-
-impl<const LAMINAR: bool, const ARTIFICIAL: bool, const EVEN: bool> Pairs<'_, LAMINAR, ARTIFICIAL, EVEN> {
-    /// What is made of the sums for a particle, and of Σ f·d⊗d if pressures act by their differences.
-    fn with_moment(&self, i: usize, sums: [f64; 16], moment: Option<Symmetric>) -> [f64; 13] {
+    /// What is made of the sums for a particle, of Σ f·(ρ_j − ρ₀)·d, and of Σ f·d⊗d if pressures act by their
+    /// differences.
+    fn finished(
+        &self,
+        i: usize,
+        sums: [f64; SUMS],
+        denser_along: DVec3,
+        moment: Option<Symmetric>,
+    ) -> [f64; 13] {
         let [px, py, pz, departing, denser, cx, cy, cz, squares, weights, ux, uy, uz, sx, sy, sz] = sums;
         let rates = &self.0;
         let Rates { parameters, steepness, laminar, .. } = *rates;
@@ -276,7 +282,9 @@ impl<const LAMINAR: bool, const ARTIFICIAL: bool, const EVEN: bool> Pairs<'_, LA
             }
         }
         let acceleration = push / density + mean * drag + parameters.gravity;
-        let crowding = depth * crowding;
+        // where the fluid is denser because it is compressed, particles do not crowd
+        let compressed = steepness * denser_along + rates.excess[i] * (crowding_by_pairs - crowding);
+        let crowding = depth * (crowding + compressed / rest);
         // differences of pressure make waves grow, so that all their motion is damped
         let smooth =
             if ARTIFICIAL && !rates.differences { DVec3::new(sx, sy, sz) / weights } else { DVec3::ZERO };
@@ -309,15 +317,86 @@ impl<const LAMINAR: bool, const ARTIFICIAL: bool, const EVEN: bool> Pairs<'_, LA
     }
 }
 
+impl<const LAMINAR: bool, const ARTIFICIAL: bool, const EVEN: bool> PairPass<8, SUMS, 13>
+    for Pairs<'_, LAMINAR, ARTIFICIAL, EVEN>
+{
+    #[inline(always)]
+    fn add<S: Simd, V: SimdFloat<S, Element: Real>>(
+        &self,
+        d: [V; 3],
+        r2: V,
+        own: &[V; 8],
+        other: [V; 8],
+        sums: &mut [V; SUMS],
+    ) {
+        self.sum(d, r2, own, &other, sums);
+    }
+
+    fn finish(&self, i: usize, sums: [f64; SUMS]) -> [f64; 13] {
+        self.finished(i, sums, DVec3::ZERO, None)
+    }
+}
+
+/// The pass over pairs of a fluid that is shifted. It also sums f·(ρ_j − ρ₀)·d, which is how far particles
+/// crowd because the fluid is compressed.
+#[derive(Clone, Copy)]
+pub(super) struct Shifted<'a, const LAMINAR: bool, const ARTIFICIAL: bool>(pub Rates<'a>);
+
+impl<const LAMINAR: bool, const ARTIFICIAL: bool> Shifted<'_, LAMINAR, ARTIFICIAL> {
+    #[inline(always)]
+    fn sum<S: Simd, V: SimdFloat<S, Element: Real>>(
+        &self,
+        d: [V; 3],
+        r2: V,
+        own: &[V; 8],
+        other: &[V; 8],
+        (sums, denser_along): (&mut [V; SUMS], &mut [V; 3]),
+    ) {
+        Pairs::<LAMINAR, ARTIFICIAL, true>(self.0).sum(d, r2, own, other, sums);
+        let s = self.0.kernel.nearness(r2);
+        let denser = s * s * s * other[4];
+        for k in 0..3 {
+            denser_along[k] = denser.mul_add(d[k], denser_along[k]);
+        }
+    }
+}
+
+impl<const LAMINAR: bool, const ARTIFICIAL: bool> PairPass<8, SHIFTED_SUMS, 13>
+    for Shifted<'_, LAMINAR, ARTIFICIAL>
+{
+    #[inline(always)]
+    fn add<S: Simd, V: SimdFloat<S, Element: Real>>(
+        &self,
+        d: [V; 3],
+        r2: V,
+        own: &[V; 8],
+        other: [V; 8],
+        sums: &mut [V; SHIFTED_SUMS],
+    ) {
+        let (mut all, mut denser) = split(sums);
+        self.sum(d, r2, own, &other, (&mut all, &mut denser));
+        sums[..SUMS].copy_from_slice(&all);
+        sums[SUMS..].copy_from_slice(&denser);
+    }
+
+    fn finish(&self, i: usize, sums: [f64; SHIFTED_SUMS]) -> [f64; 13] {
+        let (all, denser) = split(&sums);
+        Pairs::<LAMINAR, ARTIFICIAL, true>(self.0).finished(i, all, DVec3::from_array(denser), None)
+    }
+}
+
+/// The sums of [`Pairs`], and those of [`Shifted`] which follow them.
+#[inline(always)]
+fn split<V: Copy>(sums: &[V]) -> ([V; SUMS], [V; 3]) {
+    (std::array::from_fn(|k| sums[k]), std::array::from_fn(|k| sums[SUMS + k]))
+}
+
 /// The pass over pairs where pressures act by their differences. It also sums f·d⊗d but for its last component, which follows
 /// from f·d²: by this tensor the gradient of a pressure that is linear in space is exact wherever the particles lie.
 #[derive(Clone, Copy)]
 pub(super) struct Differences<'a, const LAMINAR: bool, const ARTIFICIAL: bool>(pub Rates<'a>);
 
-/// Sums of [`Pairs`].
-const SUMS: usize = 16;
-
-impl<const LAMINAR: bool, const ARTIFICIAL: bool> PairPass<8, 21, 13>
+impl<const LAMINAR: bool, const ARTIFICIAL: bool> PairPass<8, DIFFERENCES_SUMS, 13>
     for Differences<'_, LAMINAR, ARTIFICIAL>
 {
     #[inline(always)]
@@ -327,26 +406,26 @@ impl<const LAMINAR: bool, const ARTIFICIAL: bool> PairPass<8, 21, 13>
         r2: V,
         own: &[V; 8],
         other: [V; 8],
-        sums: &mut [V; 21],
+        sums: &mut [V; DIFFERENCES_SUMS],
     ) {
-        let mut all = [sums[0]; SUMS];
-        all.copy_from_slice(&sums[..SUMS]);
-        Pairs::<LAMINAR, ARTIFICIAL, true>(self.0).add(d, r2, own, other, &mut all);
+        let (mut all, mut denser) = split(sums);
+        Shifted::<LAMINAR, ARTIFICIAL>(self.0).sum(d, r2, own, &other, (&mut all, &mut denser));
         sums[..SUMS].copy_from_slice(&all);
+        sums[SUMS..SHIFTED_SUMS].copy_from_slice(&denser);
         let s = self.0.kernel.nearness(r2);
         let f = s * s * s;
         for (k, (a, b)) in [(0, 0), (1, 1), (1, 2), (2, 0), (0, 1)].into_iter().enumerate() {
-            sums[SUMS + k] = (f * d[a]).mul_add(d[b], sums[SUMS + k]);
+            sums[SHIFTED_SUMS + k] = (f * d[a]).mul_add(d[b], sums[SHIFTED_SUMS + k]);
         }
     }
 
-    fn finish(&self, i: usize, sums: [f64; 21]) -> [f64; 13] {
-        let [xx, yy, yz, zx, xy] = std::array::from_fn(|k| sums[SUMS + k]);
-        let mut first = [0.0; SUMS];
-        first.copy_from_slice(&sums[..SUMS]);
-        let squares = first[8];
+    fn finish(&self, i: usize, sums: [f64; DIFFERENCES_SUMS]) -> [f64; 13] {
+        let [xx, yy, yz, zx, xy] = std::array::from_fn(|k| sums[SHIFTED_SUMS + k]);
+        let (all, denser) = split(&sums);
+        let squares = all[8];
         let moment = Symmetric::new(DVec3::new(xx, yy, squares - xx - yy), DVec3::new(yz, zx, xy));
-        Pairs::<LAMINAR, ARTIFICIAL, true>(self.0).with_moment(i, first, Some(moment))
+        let denser = DVec3::from_array(denser);
+        Pairs::<LAMINAR, ARTIFICIAL, true>(self.0).finished(i, all, denser, Some(moment))
     }
 }
 

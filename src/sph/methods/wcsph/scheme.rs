@@ -61,7 +61,7 @@ use super::super::{
     tension::Tension,
 };
 use super::numbers::{Numbers, at_rest, sums_crowding, tait};
-use super::passes::{Differences, Missing, Pairs, Rates, closes_gaps};
+use super::passes::{Differences, Missing, Pairs, Rates, Shifted, closes_gaps};
 use super::{EXPONENT, Gradients, Wcsph};
 use crate::sph::{
     checkpoint::{Checkpoint, CheckpointError},
@@ -84,7 +84,7 @@ pub struct Weakly {
     drift: Vec<f64>,
     /// Densities by the places of the particles alone, kg/m³.
     filled: Vec<f64>,
-    /// Σ V ∇W + ∇λ, 1/m: the direction in which particles crowd; zero at the surface.
+    /// Σ V ∇W + ∇λ, 1/m, without what compression makes: the direction in which particles crowd; zero at the surface.
     crowding: Vectors,
     /// Predicted ρ − ρ₀.
     excess: Vec<f64>,
@@ -277,15 +277,20 @@ impl Weakly {
                 (false, false) => core.sum(&Differences::<false, false>(rates), fields, out),
             }
         } else {
-            match (rates.laminar > 0.0, rates.artificial > 0.0, rates.even) {
-                (true, true, true) => core.sum(&Pairs::<true, true, true>(rates), fields, out),
-                (true, true, false) => core.sum(&Pairs::<true, true, false>(rates), fields, out),
-                (true, false, true) => core.sum(&Pairs::<true, false, true>(rates), fields, out),
-                (true, false, false) => core.sum(&Pairs::<true, false, false>(rates), fields, out),
-                (false, true, true) => core.sum(&Pairs::<false, true, true>(rates), fields, out),
-                (false, true, false) => core.sum(&Pairs::<false, true, false>(rates), fields, out),
-                (false, false, true) => core.sum(&Pairs::<false, false, true>(rates), fields, out),
-                (false, false, false) => core.sum(&Pairs::<false, false, false>(rates), fields, out),
+            let (shifted, even) = (numbers.shifting > 0.0, sums_crowding(numbers, core));
+            match (shifted, even, rates.laminar > 0.0, rates.artificial > 0.0) {
+                (true, _, true, true) => core.sum(&Shifted::<true, true>(rates), fields, out),
+                (true, _, true, false) => core.sum(&Shifted::<true, false>(rates), fields, out),
+                (true, _, false, true) => core.sum(&Shifted::<false, true>(rates), fields, out),
+                (true, _, false, false) => core.sum(&Shifted::<false, false>(rates), fields, out),
+                (false, true, true, true) => core.sum(&Pairs::<true, true, true>(rates), fields, out),
+                (false, true, true, false) => core.sum(&Pairs::<true, false, true>(rates), fields, out),
+                (false, true, false, true) => core.sum(&Pairs::<false, true, true>(rates), fields, out),
+                (false, true, false, false) => core.sum(&Pairs::<false, false, true>(rates), fields, out),
+                (false, false, true, true) => core.sum(&Pairs::<true, true, false>(rates), fields, out),
+                (false, false, true, false) => core.sum(&Pairs::<true, false, false>(rates), fields, out),
+                (false, false, false, true) => core.sum(&Pairs::<false, true, false>(rates), fields, out),
+                (false, false, false, false) => core.sum(&Pairs::<false, false, false>(rates), fields, out),
             }
         }
         core.acceleration = acceleration;
