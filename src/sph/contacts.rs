@@ -16,7 +16,7 @@ pub struct Contacts {
     now: Mutex<Vec<Hit>>,
     /// Work on particles in the present step, J/kg, with their indices.
     work_now: Mutex<Vec<(usize, f64)>>,
-    /// Work of moving walls on the fluid, J, that was not fetched yet.
+    /// Work of moving walls on the fluid, J, that has not been fetched yet.
     work: f64,
 }
 

@@ -1,8 +1,8 @@
 //! Slices are drawn in a thread of their own, one after the other: a slice of a solid with many parts takes
 //! seconds, and meanwhile the editor gets all other answers.
 //!
-//! Invariant: each request is answered once. The thread that answers first takes it out of the state, under
-//! the lock.
+//! Invariant: each request is answered once. A thread takes a request out of the state, under the
+//! lock, before it answers.
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};

@@ -35,7 +35,7 @@ pub(in crate::sph) trait Numerics: Sync {
     /// with pressures in pairs.
     fn drag_is_too_large(&self) -> bool;
 
-    /// The speed of sound that a scene states, with the speed that it must exceed; `None` if the scene states
+    /// The speed of sound that a scene states, with the speed that it is measured by; `None` if the scene states
     /// none.
     fn stated_sound(&self, _scales: &Scales) -> Option<StatedSound> {
         None
