@@ -394,6 +394,9 @@ fn scene_passes(shared: &Shared, program: &Program, scene: &Scene) -> Result<(),
             format!("{:.3e} s ({})", step.seconds, step.reason)
         }
     );
+    for (key, word) in parameters.method.words() {
+        say!("  {key}: {word}");
+    }
     for (pass, absence) in simulation.plan() {
         match absence {
             None => say!("  runs      {pass}"),

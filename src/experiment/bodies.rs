@@ -37,30 +37,26 @@ pub struct Body {
 }
 
 /// The outside of a scene's container, or an obstacle, at all times.
-pub(super) struct Part<'a> {
-    name: &'a str,
+pub(super) struct Part {
+    name: String,
     shape: Node,
     skin: Skin,
-    whole: Solid,
+    pub whole: Solid,
 }
 
 /// Compiles the outside of the container, if the scene has one, and the obstacles.
-pub(super) fn compile<'a>(
-    program: &Program,
-    scene: &'a Scene,
-    engine: Engine,
-) -> Result<Vec<Part<'a>>, Error> {
+pub(super) fn compile(program: &Program, scene: &Scene, engine: Engine) -> Result<Vec<Part>, Error> {
     let container = scene.container.iter().map(|c| (&c.name, c.outside, c.skin));
     let obstacles = scene.obstacles.iter().map(|o| (&o.name, o.shape, o.skin));
-    let part = |(name, shape, skin): (&'a String, Node, Skin)| {
-        Ok(Part { name, shape, skin, whole: program.compile(name, shape, engine)? })
+    let part = |(name, shape, skin): (&String, Node, Skin)| {
+        Ok(Part { name: name.clone(), shape, skin, whole: program.compile(name, shape, engine)? })
     };
     container.chain(obstacles).map(part).collect()
 }
 
 /// The greatest speed, m/s, of walls and surfaces that move.
-pub(super) fn greatest_speed(program: &Program, scene: &Scene, parts: &[Part<'_>]) -> f64 {
-    let speed = |part: &Part<'_>| {
+pub(super) fn greatest_speed(program: &Program, scene: &Scene, parts: &[Part]) -> f64 {
+    let speed = |part: &Part| {
         let belt = part.skin.velocity.map(|nodes| vector_field(program, &nodes));
         wall_speed::greatest(&part.whole, (part.skin.slip, belt), &scene.domain, scene.run.until)
     };
@@ -73,7 +69,7 @@ pub(super) fn of_parts(
     scene: &Scene,
     parameters: &Parameters,
     engine: Engine,
-    parts: Vec<Part<'_>>,
+    parts: Vec<Part>,
 ) -> Result<Vec<Body>, Error> {
     parts.into_iter().map(|part| body(program, scene, parameters, engine, part)).collect()
 }
@@ -83,13 +79,16 @@ fn body(
     scene: &Scene,
     parameters: &Parameters,
     engine: Engine,
-    part: Part<'_>,
+    part: Part,
 ) -> Result<Body, Error> {
     let Part { name, shape, skin, whole } = part;
     let solid = whole.at(0.0);
     let has_maps = whole.moves() && parameters.walls_have_density();
-    let parts =
-        if has_maps { rigid_parts::of(program, (name, shape), scene.run.until, engine)? } else { Vec::new() };
+    let parts = if has_maps {
+        rigid_parts::of(program, (&name, shape), scene.run.until, engine)?
+    } else {
+        Vec::new()
+    };
     let changing = (has_maps && parts.is_empty())
         .then(|| changing_shape(program, shape, &whole, scene, parameters))
         .flatten();

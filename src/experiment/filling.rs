@@ -20,7 +20,7 @@ use super::{
     Experiment,
     layers::{Chords, Layers},
     refuse,
-    room::{part_in_box, quick_fields},
+    room::{LEAST_ROOM, part_in_box, quick_fields},
 };
 use crate::compile::Error;
 use crate::diagnostic::{Code, Diagnostic};
@@ -38,9 +38,6 @@ const GOOD_ENOUGH: f64 = 1e-3;
 
 /// Masses of a particle that differ by less than this part cannot be distinguished from errors of the volume.
 const SAME: f64 = 3e-4;
-
-/// If the room of a scene is at least this many times the volume of its fluid, the fluid has a surface.
-const LEAST_ROOM: f64 = 1.03;
 
 /// Maximum number of lattices that are tried for one shape.
 const TRIALS: usize = 8;

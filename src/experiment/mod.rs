@@ -90,6 +90,11 @@ impl Experiment {
         let by_walls = bodies::greatest_speed(&program, &scene, &parts);
         let typical_speed = parameters::typical_speed(&program, &scene).max(by_walls);
         let mass = filling::mass_by_number(&scene, &fluid).unwrap_or(scene.fluid.mass);
+        let scales = parameters::of_scene(&program, &scene, mass, typical_speed).scales();
+        let mut method = scene.method;
+        let has_surface = || room::has_surface(&scene, &fluid, parts.iter().map(|part| &part.whole));
+        method.settle(&scales, &has_surface);
+        let scene = Scene { method, ..scene };
         let mut parameters = parameters::of_scene(&program, &scene, mass, typical_speed);
         let (time_step, too_long) = parameters::time_step(&scene, &parameters);
         parameters.time_step = time_step.seconds;
@@ -117,7 +122,7 @@ impl Experiment {
         &self.program
     }
 
-    /// The scene, as the file states it.
+    /// The scene, as the file states it, with what its method derives from whether the fluid has a free surface.
     pub fn scene(&self) -> &Scene {
         &self.scene
     }

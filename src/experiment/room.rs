@@ -18,6 +18,23 @@ const SAMPLES: f64 = 40.0;
 /// Number of halvings that find the border of an empty slab, to a part in 10¹² of the box.
 const HALVINGS: usize = 40;
 
+/// Steps from one sample to the next, in parts of a box: the powers 1 to 3 of the inverse of x⁴ = x + 1, whose
+/// multiples fill a box evenly, along each side too, however flat it is (Roberts 2018).
+const SPREAD: DVec3 = DVec3::new(0.819_172_513_396_164_4, 0.671_043_606_703_789_3, 0.549_700_477_901_970_3);
+
+/// Samples in the room of a scene that show for certain whether it is full, and those that will do where it is a
+/// small part of its box, of which there are no more than the last number.
+const ENOUGH_SAMPLES: f64 = 4096.0;
+const LEAST_SAMPLES: f64 = 1000.0;
+const MOST_SAMPLES: u32 = 1 << 18;
+
+/// Standard deviations by which the dry samples are too many for a fluid without a surface, so that no more are
+/// taken.
+const CERTAIN: f64 = 5.0;
+
+/// If the room of a scene is at least this many times the volume of its fluid, the fluid has a surface.
+pub(super) const LEAST_ROOM: f64 = 1.03;
+
 /// The least part of a fluid outside the box that is worth a warning: less is an edge between samples.
 const PART_OUTSIDE: f64 = 0.02;
 
@@ -385,6 +402,35 @@ pub(super) fn samples(region: &Aabb) -> impl Iterator<Item = DVec3> + use<> {
         let (i, j, k) = (index % nx, index / nx % ny, index / (nx * ny));
         min + cell * (DVec3::new(i as f64, j as f64, k as f64) + 0.5)
     })
+}
+
+/// Whether the fluid leaves room free at the start, so that it has a free surface. Found by samples; if too few
+/// of them lie in the room, it counts as having one.
+pub(super) fn has_surface<'a>(scene: &Scene, fluid: &Solid, bodies: impl Iterator<Item = &'a Solid>) -> bool {
+    if scene.fluid.particles.is_some() && scene.fluid.size_span.is_some() {
+        // that many particles of that size need not fill the shape
+        return true;
+    }
+    let bodies: Vec<Solid> = bodies.map(|body| body.at(0.0)).collect();
+    let (min, size) = (scene.domain.min, scene.domain.size());
+    let (mut dry, mut wet) = (0.0, 0.0);
+    let is_dry = |dry: f64, wet: f64| dry >= (LEAST_ROOM - 1.0) * wet;
+    for k in 1..=MOST_SAMPLES {
+        let at = min + size * (f64::from(k) * SPREAD).fract();
+        let is_free = bodies.iter().all(|body| body.omega(at) < 0.0);
+        if !is_free {
+            continue;
+        }
+        *(if fluid.omega(at) > 0.0 { &mut wet } else { &mut dry }) += 1.0;
+        let expected = (LEAST_ROOM - 1.0) * wet;
+        if dry > expected + CERTAIN * (1.0 + expected.sqrt()) {
+            return true;
+        }
+        if dry + wet >= ENOUGH_SAMPLES {
+            return is_dry(dry, wet);
+        }
+    }
+    dry + wet < LEAST_SAMPLES || is_dry(dry, wet)
 }
 
 /// A length as a file writes it, with three digits: `2.5 mm`, `0.12 m`.

@@ -37,7 +37,7 @@ fn support(method: Method) -> f64 {
 fn wcsph(gradients: Gradients) -> Method {
     Method::Wcsph(Wcsph {
         sound_speed: Some(10.0 * (9.81f64 * 2.0 * 1.5).sqrt()),
-        gradients,
+        gradients: Some(gradients),
         ..Wcsph::default()
     })
 }

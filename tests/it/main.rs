@@ -62,6 +62,7 @@ mod triangle_solids;
 mod validation;
 mod vessels;
 mod view;
+mod viscous;
 mod wall_work;
 mod walls;
 mod watching;

@@ -10,6 +10,9 @@ use rfm::sph::Simulation;
 #[derive(Debug, Clone, Serialize)]
 pub(super) struct FlowRun {
     pub method: &'static str,
+    /// What the method's keys hold, as far as they are words: runs of other words are of another method.
+    #[serde(skip)]
+    pub words: Vec<(&'static str, &'static str)>,
     /// Precision of the sums over neighbours.
     pub precision: &'static str,
     pub particles: usize,
@@ -52,7 +55,7 @@ impl FlowRun {
     /// Sets the orders of convergence from the coarser run before this one.
     pub fn compare(&mut self, coarser: &Self) {
         let halvings = (coarser.spacing / self.spacing).ln();
-        if coarser.method != self.method || halvings <= 0.0 {
+        if (coarser.method, &coarser.words) != (self.method, &self.words) || halvings <= 0.0 {
             return;
         }
         let rounding = self.rounding();
@@ -77,6 +80,7 @@ impl FlowRun {
         let parameters = simulation.parameters();
         Self {
             method: parameters.method.name(),
+            words: parameters.method.words(),
             precision: parameters.precision.name(),
             particles: simulation.particles().len(),
             spacing: parameters.spacing(),
@@ -103,6 +107,7 @@ mod tests {
     fn run(spacing: f64, error: f64, precision: &'static str) -> FlowRun {
         FlowRun {
             method: "wcsph",
+            words: Vec::new(),
             precision,
             particles: 1,
             spacing,

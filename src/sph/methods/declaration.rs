@@ -67,8 +67,15 @@ pub enum Value<M: 'static> {
         /// Sets the number.
         set: fn(&mut M, u32),
     },
-    /// One of a few words, each with the function that sets it. The first is the default.
-    Word(&'static [(&'static str, Setter<M>)]),
+    /// One of a few words.
+    Word {
+        /// The words, each with the function that sets it.
+        words: &'static [(&'static str, Setter<M>)],
+        /// Returns the word that the numbers have.
+        get: fn(&M) -> &'static str,
+        /// How the word is derived if it is not stated; empty if the first is the default.
+        derived: &'static str,
+    },
 }
 
 /// The defaults of a fluid in a method, for keys that its scene does not state.
@@ -135,6 +142,10 @@ pub(in crate::sph) trait Declaration: Default + 'static {
     /// When [`Declaration::support`] is not that of the fluid's defaults, in words, and what it is then.
     const OTHER_SUPPORT: Option<(Support, &'static str)> = None;
 
+    /// Settles the numbers that are not stated and depend on whether the fluid of a scene has a free surface. To look
+    /// for one takes time, so a method does it only if it must.
+    fn settle(&mut self, _scales: &Scales, _has_surface: &dyn Fn() -> bool) {}
+
     /// The support radius that suits these numbers, for a fluid with surface tension or without.
     fn support(&self, _has_tension: bool) -> Support {
         Self::FLUID.support
@@ -176,7 +187,7 @@ pub(super) fn read<M: Declaration>(numbers: &mut M, reader: &mut dyn KeyReader) 
                     set(numbers, count);
                 }
             }
-            Value::Word(words) => {
+            Value::Word { words, .. } => {
                 let known: Vec<&'static str> = words.iter().map(|(word, _)| *word).collect();
                 if let Some((_, set)) = reader.word(*block, name, &known).and_then(|index| words.get(index)) {
                     set(numbers);
@@ -184,6 +195,15 @@ pub(super) fn read<M: Declaration>(numbers: &mut M, reader: &mut dyn KeyReader) 
             }
         }
     }
+}
+
+/// The keys of a method that hold words, with the words that its numbers have.
+pub(super) fn words<M: Declaration>(numbers: &M) -> Vec<(&'static str, &'static str)> {
+    let word = |key: &Key<M>| match &key.value {
+        Value::Word { get, .. } => Some((key.name, get(numbers))),
+        Value::Number { .. } | Value::Count { .. } => None,
+    };
+    M::KEYS.iter().filter_map(word).collect()
 }
 
 /// Checks the numbers of a method against the bounds of its keys.
@@ -205,7 +225,7 @@ pub(super) fn check<M: Declaration>(numbers: &M) -> Result<(), ParameterError> {
                     return Err(ParameterError { name, found: f64::from(found), expected });
                 }
             }
-            Value::Word(_) => {}
+            Value::Word { .. } => {}
         }
     }
     Ok(())
@@ -286,9 +306,11 @@ impl KeyInfo {
             Value::Count { least, get, .. } => {
                 (None, format!("a whole number of at least {least}"), get(&numbers).to_string())
             }
-            Value::Word(words) => {
+            Value::Word { words, derived, .. } => {
                 let known: Vec<&str> = words.iter().map(|(word, _)| *word).collect();
-                (None, known.join(", "), known.first().copied().unwrap_or_default().to_string())
+                let default =
+                    if derived.is_empty() { known.first().copied().unwrap_or_default() } else { derived };
+                (None, known.join(", "), default.to_string())
             }
         };
         Self { name: key.name, block: key.block, about: key.about, unit, accepts, default }

@@ -43,7 +43,7 @@ pub use paper::Paper;
 pub use reference::{method_reference, methods_overview, methods_reference};
 pub use wcsph::{Gradients, Wcsph};
 
-use declaration::{Declaration, check, read};
+use declaration::{Declaration, check, read, words};
 
 pub(super) use numerics::{COURANT, Numerics, StatedSound};
 pub(super) use scheme::Scheme;
@@ -89,9 +89,19 @@ macro_rules! methods {
                 match self { $(Self::$method(numbers) => numbers.support(has_tension)),* }
             }
 
+            /// Settles the numbers that are not stated and depend on whether the fluid of a scene has a free surface.
+            pub(crate) fn settle(&mut self, scales: &Scales, has_surface: &dyn Fn() -> bool) {
+                match self { $(Self::$method(numbers) => numbers.settle(scales, has_surface)),* }
+            }
+
             /// Sets the numbers of the method from the keys that a scene states.
             pub fn read(&mut self, reader: &mut dyn KeyReader) {
                 match self { $(Self::$method(numbers) => read(numbers, reader)),* }
+            }
+
+            /// The keys of the method that hold words, with the words that its numbers have.
+            pub fn words(&self) -> Vec<(&'static str, &'static str)> {
+                match self { $(Self::$method(numbers) => words(numbers)),* }
             }
 
             /// Checks the numbers of the method against the bounds of its keys.
@@ -149,10 +159,10 @@ impl Default for Method {
 mod tests {
     use super::*;
 
-    /// A reader that states no key, or the first word of each key.
-    struct FirstWords(bool);
+    /// A reader that states the default of each key that is a word and is not derived from anything else.
+    struct DefaultWords(MethodInfo);
 
-    impl KeyReader for FirstWords {
+    impl KeyReader for DefaultWords {
         fn number(
             &mut self,
             _: KeyBlock,
@@ -167,19 +177,54 @@ mod tests {
             None
         }
 
-        fn word(&mut self, _: KeyBlock, _: &'static str, _: &[&'static str]) -> Option<usize> {
-            self.0.then_some(0)
+        fn word(&mut self, block: KeyBlock, key: &'static str, words: &[&'static str]) -> Option<usize> {
+            let default = &self.0.key(block, key)?.default;
+            words.iter().position(|word| word == default)
         }
     }
 
     #[test]
-    fn the_first_word_of_a_key_is_its_default() {
+    fn a_key_that_states_its_default_changes_nothing() {
         for method in Method::all() {
-            for state_words in [false, true] {
-                let mut read = method;
-                read.read(&mut FirstWords(state_words));
-                assert_eq!(read, method);
+            let mut read = method;
+            read.read(&mut DefaultWords(method.info()));
+            assert_eq!(read, method);
+        }
+    }
+
+    #[test]
+    fn only_what_is_not_stated_depends_on_the_surface_of_the_fluid() {
+        let oil = Scales {
+            rest_density: 1000.0,
+            particle_mass: 1e-3,
+            support_radius: 0.03,
+            viscosity: 10.0,
+            surface_tension: 0.0,
+            expected_speed: 1.0,
+            sticks: true,
+        };
+        let water = Scales { viscosity: 1e-3, ..oil };
+        let settled = |wcsph: Wcsph, scales: &Scales, has_surface: bool| {
+            let mut method = Method::from(wcsph);
+            method.settle(scales, &|| has_surface);
+            let Method::Wcsph(wcsph) = method else { panic!("{method:?}") };
+            wcsph.gradients
+        };
+        let [pairs, differences] = [Some(Gradients::Pairs), Some(Gradients::Differences)];
+        let open = Wcsph::default();
+        assert_eq!(settled(open, &oil, false), differences);
+        assert_eq!(settled(open, &oil, true), pairs);
+        assert_eq!(settled(open, &water, false), pairs);
+        assert_eq!(settled(Wcsph { shifting: Some(0.0), ..open }, &oil, false), pairs);
+        for gradients in [pairs, differences] {
+            for has_surface in [false, true] {
+                assert_eq!(settled(Wcsph { gradients, ..open }, &oil, has_surface), gradients);
             }
+        }
+        for mut method in [Method::from(Dfsph::default()), Method::from(Paper::default())] {
+            let before = method;
+            method.settle(&oil, &|| panic!("they do not ask"));
+            assert_eq!(method, before);
         }
     }
 

@@ -17,6 +17,14 @@ pub enum NegativePressure {
 }
 
 impl NegativePressure {
+    /// The word for it in scenes.
+    pub(super) fn name(self) -> &'static str {
+        match self {
+            Self::Clamp => "clamp",
+            Self::Keep => "keep",
+        }
+    }
+
     /// The pressure that acts, Pa, from that of the equation of state, Pa.
     #[inline]
     pub(super) fn of(self, pressure: f64) -> f64 {

@@ -85,10 +85,14 @@ impl Declaration for Paper {
             name: "negative_pressure",
             block: KeyBlock::Fluid,
             about: "whether pressure may pull (keep) or is cut off at zero (clamp)",
-            value: Value::Word(&[
-                ("clamp", |paper| paper.negative_pressure = NegativePressure::Clamp),
-                ("keep", |paper| paper.negative_pressure = NegativePressure::Keep),
-            ]),
+            value: Value::Word {
+                words: &[
+                    ("clamp", |paper| paper.negative_pressure = NegativePressure::Clamp),
+                    ("keep", |paper| paper.negative_pressure = NegativePressure::Keep),
+                ],
+                get: |paper| paper.negative_pressure.name(),
+                derived: "",
+            },
         },
     ];
     const PASSES: &'static [(Pass, Absence<Self>)] = &[

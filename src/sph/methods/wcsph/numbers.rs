@@ -24,7 +24,7 @@ impl Numbers {
             sound_speed: parameters.sound_speed(),
             density_diffusion: wcsph.density_diffusion(&parameters.scales()),
             artificial_viscosity: wcsph.artificial_viscosity(&parameters.scales()),
-            gradients: wcsph.gradients,
+            gradients: wcsph.gradients(),
             shifting: wcsph.shifting(),
             negative_pressure: wcsph.negative_pressure,
         }
