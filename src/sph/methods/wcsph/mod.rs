@@ -17,20 +17,19 @@ use crate::sph::scales::Scales;
 /// The exponent of Tait's equation for water.
 const EXPONENT: i32 = 7;
 
-/// The part of the expected speed from which on the speed √(σ/ρa) of surface tension over a spacing a counts.
+/// Surface tension counts if its speed √(σ/ρa) over a spacing a is more than this part of the expected speed.
 const CAPILLARY: f64 = 0.05;
 
-/// α of the artificial viscosity with pairs of pressures, unless it is stated.
+/// Default α of the artificial viscosity with pairs of pressures.
 const PAIRS_ALPHA: f64 = 0.1;
 
-/// The same with differences. A fluid that is more viscous than this needs none.
+/// Default α with differences. A fluid that is more viscous than this needs no artificial viscosity.
 const DIFFERENCES_ALPHA: f64 = 0.02;
 
-/// The part of the artificial viscosity from which on a fluid's own takes its place. Water has far less.
+/// A fluid's own viscosity reduces the artificial one if it is at least this part of it. Water has far less.
 const THIN: f64 = 0.01;
 
-/// The speed of sound over the greatest expected speed, unless it is stated. This keeps changes of the
-/// density within 1 %.
+/// Default speed of sound over the greatest expected speed. It keeps changes of the density within 1 %.
 const SOUND_OVER_SPEED: f64 = 10.0;
 
 /// How the pressures of two particles enter their acceleration.
@@ -39,28 +38,28 @@ pub enum Gradients {
     /// Sums p_i + p_j: what one particle gains, the other loses, so momentum is conserved to rounding.
     #[default]
     Pairs,
-    /// Differences p_j − p_i in the fluid's depth: exact where the pressure is linear in space, and better than
-    /// pairs in viscous flows and those without a free surface. They need shifting and, at a free surface, an
-    /// artificial viscosity of some 0.05: without it, waves gain energy.
+    /// Differences p_j − p_i in the fluid's depth: exact where the pressure is linear in space, and better
+    /// than pairs in viscous flows and those without a free surface. They need shifting and, at a free
+    /// surface, an artificial viscosity of some 0.05: without it, waves gain energy.
     Differences,
 }
 
 /// Numbers of the weakly compressible method.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Wcsph {
-    /// Speed of sound c, m/s. `None`: ten times √(u² + σ/ρa), with the greatest expected speed u and surface tension σ over a
-    /// spacing a, which keeps changes of the density within 1 %.
+    /// Speed of sound c, m/s. `None`: ten times √(u² + σ/ρa), with the greatest expected speed u, and the
+    /// surface tension σ over a spacing a. This keeps changes of the density within 1 %.
     pub sound_speed: Option<f64>,
-    /// δ of the density diffusion (Molteni & Colagrossi 2009). `None`: 0.1, and 0 where surface tension moves the fluid;
-    /// zero: the term is not computed.
+    /// δ of the density diffusion (Molteni & Colagrossi 2009). `None`: 0.1, and 0 where surface tension moves
+    /// the fluid; zero: the term is not computed.
     pub density_diffusion: Option<f64>,
-    /// α of the artificial viscosity (Monaghan 1992). With pairs of pressures it acts on rough motion alone; with
-    /// differences on all, which without it would gain energy. `None`: 0.1 with pairs, 0.02 with differences, less what the
-    /// fluid's own viscosity damps; zero: the term is not computed.
+    /// α of the artificial viscosity (Monaghan 1992). With pairs of pressures it acts on rough motion alone.
+    /// With differences it acts on all motion, which would gain energy without it. `None`: 0.1 with pairs,
+    /// 0.02 with differences, less what the fluid's own viscosity damps; zero: the term is not computed.
     pub artificial_viscosity: Option<f64>,
     /// How the pressures of two particles enter their acceleration. `None`: in pairs. Where an
-    /// [`Experiment`](crate::experiment::Experiment) finds a viscous fluid that fills all room of its scene, it
-    /// chooses differences instead.
+    /// [`Experiment`](crate::experiment::Experiment) finds a viscous fluid that fills all room of its scene,
+    /// it chooses differences instead.
     pub gradients: Option<Gradients>,
     /// How strongly particles drift to where there are fewer of them, which keeps them evenly distributed.
     /// Zero: no drift. `None`: 1 with differences of pressure, 0 with sums.
@@ -87,22 +86,25 @@ impl Default for Wcsph {
 }
 
 impl Wcsph {
-    /// δ of the density diffusion, stated or derived. Surface tension acts on a layer of particles, in which the density
-    /// therefore grows with the depth. Diffusion levels that, out of step with the motion: a drop that oscillates, or one at
-    /// rest, gains energy. So there is none where waves of the particles' size are not much slower than the fluid.
+    /// δ of the density diffusion, stated or derived. Surface tension acts on a layer of particles, so the
+    /// density grows with the depth in that layer. Diffusion levels this growth out of step with the motion,
+    /// and a drop gains energy, whether it oscillates or rests. So there is no diffusion unless waves of the
+    /// particles' size are much slower than the fluid.
     fn density_diffusion(&self, scales: &Scales) -> f64 {
         let moves = ripples(scales) > CAPILLARY * scales.expected_speed;
         self.density_diffusion.unwrap_or(if moves { 0.0 } else { 0.1 })
     }
 
-    /// The speed √(u² + σ/ρa), m/s, whose square times the rest density is the greatest pressure that is expected: of the expected
-    /// speed u, and of ripples. Surface tension presses with 2σ/r on a drop of the radius r, which is at least two spacings a.
+    /// The speed √(u² + σ/ρa), m/s, of the expected speed u and of ripples. Its square times the rest density
+    /// is the greatest expected pressure. Surface tension presses with 2σ/r on a drop of the radius r, which
+    /// is at least two spacings a.
     fn driven_speed(&self, scales: &Scales) -> f64 {
         scales.expected_speed.hypot(ripples(scales))
     }
 
-    /// α of the artificial viscosity, stated or derived: what a fluid's own viscosity damps need not be damped again. (In a ring
-    /// ten spacings wide, with half as much artificial viscosity as its own, a flow was 24 % too slow, and is 14 % without it.)
+    /// α of the artificial viscosity, stated or derived. It is reduced by the fluid's own viscosity, which
+    /// damps already. (In a ring ten spacings wide, a flow with half as much artificial viscosity as its own
+    /// is 24 % too slow, and 14 % without it.)
     fn artificial_viscosity(&self, scales: &Scales) -> f64 {
         self.artificial_viscosity.unwrap_or_else(|| {
             let alpha = match self.gradients() {
@@ -115,11 +117,11 @@ impl Wcsph {
         })
     }
 
-    /// The support radius where pressures act by differences, which need no more, or where a bent surface must be seen
-    /// from near.
+    /// The support radius where pressures act by differences, which need no more, or where surface tension
+    /// needs the curvature of a surface on a small scale.
     const NEAR: Support = Support::Spacings(2.6);
 
-    /// How pressures enter accelerations: as stated, or as suits the fluid of a scene, or else in pairs.
+    /// How pressures enter accelerations: as stated, else as suits the fluid of a scene, else in pairs.
     pub fn gradients(&self) -> Gradients {
         self.gradients.unwrap_or_default()
     }
@@ -273,10 +275,10 @@ impl Declaration for Wcsph {
     const OTHER_SUPPORT: Option<(Support, &'static str)> =
         Some((Self::NEAR, "with surface tension or `gradients: differences`"));
 
-    /// A viscous fluid without a surface neither splashes nor has waves, which pairs are for. With pairs such a
-    /// flow in a channel that closes on itself resists 13 % too much, with ten and with twenty particles
-    /// across: the shear stirs rows of particles that push each other apart, and viscosity takes that energy,
-    /// too. With differences, which need shifting, it resists as it should to 1 %. Water stays with pairs: if
+    /// Pairs are for splashes and waves, which a viscous fluid without a surface does not have. With pairs
+    /// its flow in a channel that closes on itself resists 13 % too much, with ten and with twenty particles
+    /// across. The shear stirs rows of particles that push each other apart, and viscosity takes that energy,
+    /// too. With differences, which need shifting, the resistance is right to 1 %. Water stays with pairs: if
     /// it turns like a rigid body between walls along which it slips, differences take 8 % of its momentum in
     /// three seconds at 5 rad/s.
     fn settle(&mut self, scales: &Scales, has_surface: &dyn Fn() -> bool) {
@@ -331,7 +333,7 @@ impl Numerics for Wcsph {
         self.sound_speed.unwrap_or(SOUND_OVER_SPEED * self.driven_speed(scales))
     }
 
-    /// What a fluid is compressed by at its greatest speed, whatever speed of sound a scene states.
+    /// The compression of a fluid at its greatest speed, whatever speed of sound a scene states.
     fn kept_compression(&self) -> Option<f64> {
         Some(SOUND_OVER_SPEED.powi(-2))
     }
@@ -346,8 +348,8 @@ impl Numerics for Wcsph {
         true
     }
 
-    /// The energy ∫ p/ρ₀² dρ = c²/7·((x⁸ − 1)/8 − (x − 1)) with x = ρ/ρ₀, whose gradient is the acceleration by
-    /// pressure. It differs from ∫ p/ρ² dρ by twice the compression.
+    /// The energy ∫ p/ρ₀² dρ = c²/7·((x⁸ − 1)/8 − (x − 1)) with x = ρ/ρ₀, whose gradient is the acceleration
+    /// by pressure. It differs from ∫ p/ρ² dρ by twice the compression.
     fn elastic_energy(&self, scales: &Scales, density: f64) -> f64 {
         let x = density / scales.rest_density;
         if x < 1.0 && self.negative_pressure == NegativePressure::Clamp {
@@ -356,7 +358,7 @@ impl Numerics for Wcsph {
         self.sound_speed(scales).powi(2) / 7.0 * ((x.powi(8) - 1.0) / 8.0 - (x - 1.0))
     }
 
-    /// Differences of pressure do not cancel, so that a particle's neighbours take part in what remains.
+    /// Differences of pressure do not cancel, so the neighbours of a particle contribute to what remains.
     fn notes_reactions(&self) -> bool {
         self.gradients() == Gradients::Pairs
     }
@@ -366,7 +368,8 @@ impl Numerics for Wcsph {
 mod tests {
     use super::*;
 
-    /// Water is damped as the method says; of a thick fluid only what its own viscosity leaves, and of a thicker one nothing.
+    /// Water has the full artificial viscosity, a thick fluid only what its own viscosity leaves of it, and a
+    /// thicker one none.
     #[test]
     fn what_a_fluid_damps_itself_is_not_damped_again() {
         let of = |viscosity: f64| Scales {

@@ -1,4 +1,4 @@
-//! The method's numbers with derived values, and what follows from them for single particles.
+//! The method's numbers with derived values, and quantities of single particles that follow from them.
 
 use glam::DVec3;
 
@@ -31,8 +31,9 @@ impl Numbers {
     }
 }
 
-/// Whether how particles crowd is summed: where they are kept evenly distributed, with differences of pressure and with
-/// shifting, and where the growth of the density at rest depends on the place, as gravity does.
+/// Whether the sums include crowding. They do where particles are kept evenly distributed (with differences
+/// of pressure, and with shifting), and where the growth of the density at rest depends on the place, as
+/// gravity does.
 pub(super) fn sums_crowding(numbers: &Numbers, core: &Core) -> bool {
     numbers.shifting > 0.0 || numbers.gradients == Gradients::Differences || core.gravity_field.is_some()
 }

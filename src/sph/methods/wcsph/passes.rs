@@ -1,4 +1,4 @@
-//! The sum over neighbours, and what is made of it for each particle.
+//! The sum over neighbours, and the rates of each particle that follow from it.
 
 use fearless_simd::{Simd, SimdFloat};
 use glam::DVec3;
@@ -25,17 +25,18 @@ use crate::sph::{
 /// Squares of distances below this part of h² do not count as a direction.
 const LEAST_DISTANCE: f64 = 1e-6;
 
-/// Limits of Σ V W, with the part of a wall, between which a particle at the wall begins to take part in the balance
-/// of the fluid: spray has less, and a surface at rest more.
+/// Between these values of Σ V W, with the part of a wall, a particle at the wall begins to take part in the
+/// balance of the fluid. Spray has less, and a surface at rest more.
 const HELD: [f64; 2] = [0.7, 0.8];
 
-/// What the sum over a fluid's particles may lack of its density while that is left alone, as a part of the rest density:
-/// particles that have come to rest in disorder, and the layers of walls beside them, make an error of this size. With 0 still
-/// water eight layers deep sinks by a hundredth and its pressure is off by twice as much; with 0.03 water that has splashed
-/// stands 2 % too high.
+/// The density may exceed the sum over particles by this part of the rest density without being lowered.
+/// Particles that have come to rest in disorder, and the layers of walls beside them, make an error of this
+/// size. With 0 still water eight layers deep sinks by a hundredth, and its pressure is off by twice as much.
+/// With 0.03 water that has splashed stands 2 % too high.
 const LOOSE: f64 = 0.02;
 
-/// Least part of Σ V r⊗∇W along a direction by which a gradient is divided. In a corner particles have about a fifth.
+/// Smallest part of Σ V r⊗∇W along a direction by which a gradient is divided. In a corner particles have
+/// about a fifth.
 const LEAST_MOMENT: f64 = 0.1;
 
 /// Number of sums of [`Pairs`].
@@ -61,7 +62,7 @@ pub(super) struct Rates<'a> {
     core: &'a Core,
     velocity: &'a Vectors,
     pressure: &'a [f64],
-    /// ρ − ρ₀; where how particles crowd is not summed, less the excess in a fluid at rest.
+    /// ρ − ρ₀, kg/m³, less the excess in a fluid at rest where the sums do not include crowding.
     excess: &'a [f64],
     kernel: Wendland,
     /// The factor V·c of V∇W = −V·c·(1 − q)³·r.
@@ -76,15 +77,16 @@ pub(super) struct Rates<'a> {
     density: &'a [f64],
     /// Whether pressures act by their differences in the fluid's depth.
     differences: bool,
-    /// Rate at which densities return to what the places say, 1/s.
+    /// Rate at which densities return to those of the places, 1/s.
     return_rate: f64,
-    /// Rate at which they do where there is room, 1/s.
+    /// Rate at which they return where there is room, 1/s.
     closing_rate: f64,
-    /// What kernels miss before a free surface, as a part of the rest density; zero where that is not looked at.
+    /// The density that kernels miss before a free surface, as a part of the rest density; zero where it is
+    /// not computed.
     missing: &'a [f64],
     /// Σ V W on a lattice.
     lattice: f64,
-    /// Where what walls do is noted, if it is to be.
+    /// Receives the forces of walls, if they are wanted.
     reaction: Option<Reaction<'a>>,
 }
 
@@ -130,11 +132,10 @@ impl<'a> Rates<'a> {
     }
 }
 
-/// What the pass over pairs sums, with laminar and artificial viscosity or without, and with how particles
-/// crowd or without. With f = (1 − q)³ and d from the neighbour it sums f·(p_j − p_i + Π)·d, f·(v_i − v_j)·d,
-/// f·(ρ_j − ρ_i), f·d, f·d², W, f·((v_j − v_i)·d)·d/d² and W·v_j; the artificial viscosity Π is that of rough
-/// velocities. Where how particles crowd is not summed it has p_j + p_i instead of p_j − p_i, and omits f·d and
-/// f·d².
+/// The pass over pairs, with or without laminar viscosity, artificial viscosity and crowding. With f = (1 −
+/// q)³ and d from the neighbour it sums f·(p_j − p_i + Π)·d, f·(v_i − v_j)·d, f·(ρ_j − ρ_i), f·d, f·d², W,
+/// f·((v_j − v_i)·d)·d/d² and W·v_j, where the artificial viscosity Π is that of rough velocities. Without
+/// crowding it sums p_j + p_i instead of p_j − p_i, and omits f·d and f·d².
 #[derive(Clone, Copy)]
 pub(super) struct Pairs<'a, const LAMINAR: bool, const ARTIFICIAL: bool, const EVEN: bool>(pub Rates<'a>);
 
@@ -155,7 +156,7 @@ impl<const LAMINAR: bool, const ARTIFICIAL: bool, const EVEN: bool> Pairs<'_, LA
         let rates = &self.0;
         let s = rates.kernel.nearness(r2);
         let f = s * s * s;
-        // how fast they part, by the velocities that begin at this column
+        // how fast they part, by the velocities from column `k` on
         let parting = |k: usize| {
             let x = (own[k] - other[k]) * d[0];
             let x = (own[k + 1] - other[k + 1]).mul_add(d[1], x);
@@ -166,7 +167,7 @@ impl<const LAMINAR: bool, const ARTIFICIAL: bool, const EVEN: bool> Pairs<'_, LA
         if ARTIFICIAL {
             let least = of(0.01 * (0.5 * rates.kernel.h).powi(2));
             let rough = roughness::damped(parting(5), departing);
-            // an artificial viscosity needs no more than the twelve bits of an estimate in single precision
+            // the twelve bits of an estimate in single precision suffice for an artificial viscosity
             push -= rough * of(rates.artificial) * (r2 + least).approximate_recip();
         }
         let push = push * f;
@@ -199,8 +200,8 @@ impl<const LAMINAR: bool, const ARTIFICIAL: bool, const EVEN: bool> Pairs<'_, LA
         }
     }
 
-    /// What is made of the sums for a particle, of Σ f·(ρ_j − ρ₀)·d, and of Σ f·d⊗d if pressures act by their
-    /// differences.
+    /// The results of a particle from its sums. `denser_along` is Σ f·(ρ_j − ρ₀)·d, and `moment` is Σ f·d⊗d
+    /// if pressures act by their differences.
     fn finished(
         &self,
         i: usize,
@@ -247,7 +248,7 @@ impl<const LAMINAR: bool, const ARTIFICIAL: bool, const EVEN: bool> Pairs<'_, LA
             filled += wall.filled;
             places += 2.0 * rest * wall.part;
         }
-        // before a free surface, where a gap beside a wall is none
+        // a gap beside a wall is no free surface
         let missing = rates.missing[i];
         let whole = filled + if wall.is_some() { missing.min((1.0 - filled).max(0.0)) } else { missing };
         // how far the particle belongs to the depth of the fluid, before a surface as well
@@ -256,8 +257,8 @@ impl<const LAMINAR: bool, const ARTIFICIAL: bool, const EVEN: bool> Pairs<'_, LA
         let smooth = if rates.differences { depth } else { 0.0 };
         let mean = if smooth > 0.0 { 1.0 + smooth * (1.0 / spread - 1.0) } else { 1.0 };
         let density = rest + smooth * rates.excess[i];
-        // where pressures do not act by differences, their own pressure pushes particles apart, and walls push
-        // as their mirrored images do; without EVEN the sums contain the part of the pairs already
+        // where pressures do not act by differences, a particle's own pressure pushes particles apart, and
+        // walls push like mirror images; without EVEN the sums already contain the part of the pairs
         let pairs = push;
         push -= (1.0 - smooth) * 2.0 * rates.pressure[i] * crowding;
         let by_pairs = pairs - 2.0 * rates.pressure[i] * crowding_by_pairs;
@@ -285,7 +286,7 @@ impl<const LAMINAR: bool, const ARTIFICIAL: bool, const EVEN: bool> Pairs<'_, LA
         // where the fluid is denser because it is compressed, particles do not crowd
         let compressed = steepness * denser_along + rates.excess[i] * (crowding_by_pairs - crowding);
         let crowding = depth * (crowding + compressed / rest);
-        // differences of pressure make waves grow, so that all their motion is damped
+        // differences of pressure make waves grow, so all motion is damped
         let smooth =
             if ARTIFICIAL && !rates.differences { DVec3::new(sx, sy, sz) / weights } else { DVec3::ZERO };
         let returning = if closes_gaps(rates.numbers) { whole_depth } else { depth };
@@ -337,8 +338,8 @@ impl<const LAMINAR: bool, const ARTIFICIAL: bool, const EVEN: bool> PairPass<8, 
     }
 }
 
-/// The pass over pairs of a fluid that is shifted. It also sums f·(ρ_j − ρ₀)·d, which is how far particles
-/// crowd because the fluid is compressed.
+/// The pass over pairs of a fluid that is shifted. It also sums f·(ρ_j − ρ₀)·d, the crowding that is due to
+/// compression of the fluid.
 #[derive(Clone, Copy)]
 pub(super) struct Shifted<'a, const LAMINAR: bool, const ARTIFICIAL: bool>(pub Rates<'a>);
 
@@ -385,14 +386,15 @@ impl<const LAMINAR: bool, const ARTIFICIAL: bool> PairPass<8, SHIFTED_SUMS, 13>
     }
 }
 
-/// The sums of [`Pairs`], and those of [`Shifted`] which follow them.
+/// The sums of [`Pairs`], and the sums of [`Shifted`] that follow them.
 #[inline(always)]
 fn split<V: Copy>(sums: &[V]) -> ([V; SUMS], [V; 3]) {
     (std::array::from_fn(|k| sums[k]), std::array::from_fn(|k| sums[SUMS + k]))
 }
 
-/// The pass over pairs where pressures act by their differences. It also sums f·d⊗d but for its last component, which follows
-/// from f·d²: by this tensor the gradient of a pressure that is linear in space is exact wherever the particles lie.
+/// The pass over pairs where pressures act by their differences. It also sums f·d⊗d but for its last
+/// component, which follows from f·d². This tensor makes the gradient of a pressure that is linear in space
+/// exact wherever the particles lie.
 #[derive(Clone, Copy)]
 pub(super) struct Differences<'a, const LAMINAR: bool, const ARTIFICIAL: bool>(pub Rates<'a>);
 
@@ -430,20 +432,22 @@ impl<const LAMINAR: bool, const ARTIFICIAL: bool> PairPass<8, DIFFERENCES_SUMS, 
 }
 
 impl Rates<'_> {
-    /// How far a particle is at rest in the scene, 0 to 1: one if its speed is that of a fall through a sixteenth of a
-    /// spacing or less, zero from an eighth on. Where nothing falls there is no weight to share, and it is zero.
+    /// How far a particle is at rest in the scene, 0 to 1: one up to the speed of a fall through a sixteenth
+    /// of a spacing, and zero above that of a fall through an eighth. It is zero where nothing falls, because
+    /// there is no weight to share.
     fn calm(&self, i: usize, velocity: DVec3) -> f64 {
         let fall = 0.125 * 2.0 * self.core.gravity(i).length() * self.parameters.spacing();
         if fall > 0.0 { (2.0 - 2.0 * velocity.length_squared() / fall).clamp(0.0, 1.0) } else { 0.0 }
     }
 
-    /// The rate at which the density of a particle in the depth returns to what its place says, kg/m³/s.
+    /// The rate at which the density of a particle in the depth returns to that of its place, kg/m³/s.
     ///
-    /// Where nothing pulls, a density below that at rest is as good as that at rest, and is left alone. One above it is that of
-    /// a particle which presses. If it has room around it, its density is that of another place, of a surface that a splash has
-    /// folded in for instance, and falls until neighbours have filled the room. (When it fell no lower than that
-    /// at rest, what is too dense by disorder raised densities and nothing lowered them: water that came to rest after a
-    /// splash stood 15 % too high, and a block that was lowered into it raised it four times too far.)
+    /// Where nothing pulls, a density below the rest density is as good as the rest density, and is left
+    /// alone. A particle whose density is higher presses. If such a particle has room around it, its density
+    /// belongs to another place, for instance a surface that a splash has folded in. Then the density falls
+    /// until neighbours have filled the room. (If densities could not fall below the rest density, excess by
+    /// disorder would raise them and nothing would lower them: water that comes to rest after a splash would
+    /// stand 15 % too high, and a block that is lowered into it would raise it four times too far.)
     fn returns(&self, i: usize, filled: f64) -> f64 {
         let rest = self.parameters.rest_density;
         let (target, density) = (rest * filled, self.density[i]);
@@ -455,12 +459,14 @@ impl Rates<'_> {
     }
 }
 
-/// Whether densities above that at rest fall where there is room: where pressures cannot pull, and add up in pairs.
+/// Whether densities above the rest density fall where there is room: if pressures cannot pull, and act in
+/// pairs.
 pub(super) fn closes_gaps(numbers: &Numbers) -> bool {
     numbers.negative_pressure == NegativePressure::Clamp && numbers.gradients == Gradients::Pairs
 }
 
-/// The pass over pairs that finds what kernels miss before a free surface, as a part of the rest density.
+/// The pass over pairs that finds the density that kernels miss before a free surface, as a part of the rest
+/// density.
 #[derive(Clone, Copy)]
 pub(super) struct Missing<'a> {
     core: &'a Core,

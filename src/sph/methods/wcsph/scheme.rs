@@ -1,39 +1,45 @@
-//! The scheme of a weakly compressible fluid: the density follows from how the particles move, and the pressure
-//! from the density (Tait).
+//! The scheme of a weakly compressible fluid: the density follows from how the particles move, and the
+//! pressure from the density (Tait).
 //!
 //! ```text
-//! ρ_i = Q_i + o_i,  Q_i = Σ m W + 2ρ₀ λ,  do_i/dt = δ·h·c Σ 2(ρ_j − ρ_i − ρᴴ_ji) V r_ji·∇W/r² + (what places say)
+//! ρ_i = Q_i + o_i,  Q_i = Σ m W + 2ρ₀ λ,
+//! do_i/dt = δ·h·c Σ 2(ρ_j − ρ_i − ρᴴ_ji) V r_ji·∇W/r² + (what places say)
 //! a_i = g − 1/ρ₀·[Σ V (p_i + p_j) ∇W + 2 p_i ∇λ] + viscosity
 //! p = c²ρ₀/7·((ρ/ρ₀)⁷ − 1)
 //! ```
 //!
-//! Energy: but for the factor at walls below, the acceleration by pressure is the gradient of the elastic energy Σ m·e(ρ), e = ∫ p/ρ₀² dρ, by the
-//! places, because a density changes with the places as Q does. What viscosity and diffusion do only takes
-//! energy away. So nothing is gained but the errors of finite steps. These have a sign: the pressure at a new
-//! place is that of a density which is extrapolated from the last two rates, and the density is then made
-//! exact by the Q that the same sum finds. (One particle between two walls, with steps at the limit: with
-//! densities that are integrated along the way, 7 m/s become 50 m/s in a second. With the exact density from
-//! a sum of its own the energy is up to 0.5 % above its start, with the extrapolated one 0.05 %.)
+//! Energy: a density changes with the places as Q does. So, but for the factor at walls below, the
+//! acceleration by pressure is the gradient of the elastic energy Σ m·e(ρ), e = ∫ p/ρ₀² dρ, with respect to
+//! the places. Viscosity and diffusion only take energy away. Energy is therefore gained only by the errors
+//! of finite steps, and these have a sign. The pressure at a new place is that of a density extrapolated from
+//! the last two rates; the density is then made exact by the Q that the same sum finds. (One particle between
+//! two walls, with steps at the limit: if densities are integrated along the way, 7 m/s become 50 m/s in a
+//! second. With the exact density from a separate sum the energy is up to 0.5 % above its start, with the
+//! extrapolated one 0.05 %.)
 //!
-//! A density that started at a surface knows too much once its particle is deep in the fluid, and diffusion
-//! mixes such densities. In the fluid they therefore return to what the places say, Σ m W over its value on a lattice,
-//! plus the part of the walls and what is missing before a free surface
-//! ([`free_surface`](super::super::free_surface)), within two hundredths where there is room, and there not slower than a fluid falls together.
+//! A density that started at a surface is no longer right once its particle is deep in the fluid, and
+//! diffusion mixes such densities. In the fluid they therefore return to the density of the places: Σ m W
+//! over its value on a lattice, plus the part of the walls and what is missing before a free surface
+//! ([`free_surface`](super::super::free_surface)). Where there is room they return to within two hundredths,
+//! and not slower than a fluid falls together.
 //!
 //! Kernel: Wendland C2 (1995), under which particles do not clump. Density diffusion: Molteni & Colagrossi
 //! (2009), without the hydrostatic part ρᴴ (Fourtakas et al. 2019), so that it does not lift a fluid at rest.
-//! Viscosity: laminar (Monaghan & Gingold 1983, with the factor 2(d + 2) = 10 of three dimensions) and artificial
-//! (Monaghan 1992), with pairs of pressures that of rough motion alone ([`Roughness`]). Both act along the lines between
-//! particles and so, with pairs of pressures, conserve angular momentum.
+//! Viscosity: laminar (Monaghan & Gingold 1983, with the factor 2(d + 2) = 10 of three dimensions) and
+//! artificial (Monaghan 1992); with pairs of pressures the artificial one acts on rough motion alone
+//! ([`Roughness`]). Both act along the lines between particles, so with pairs of pressures they conserve
+//! angular momentum.
 //!
-//! With `gradients: differences` the depth of the fluid has gradients by differences instead, divided by what the same sum
-//! makes of the gradient of a position: the tensor −Σ V r⊗∇W over a particle's neighbours (Bonet & Lok 1999). So a pressure
-//! that is linear in space has its exact gradient, however far above zero it lies, wherever the neighbours are, and at walls,
-//! where half of them are missing, too. (Closed forms of what walls take hold for walls that are whole, and not for the places of
-//! particles: with these still water would move along edges and out of corners for ever, at 4 cm/s and more.) Such forces do not push particles apart; shifting
-//! keeps the particles evenly distributed instead ([`super::super::shifting`]). At a free surface and in spray, where
-//! G = −⅓ Σ V r·∇W + ⅓ tr K is small (it is 0.98 on a lattice at h = 2.6 spacings), pressures act as sums p_i + p_j there too.
-//! Densities then follow the equation of continuity, and neither energy nor momentum is conserved by construction.
+//! With `gradients: differences` the depth of the fluid has gradients by differences instead. They are
+//! divided by the gradient of a position by the same sum: the tensor −Σ V r⊗∇W over a particle's neighbours
+//! (Bonet & Lok 1999). So the gradient of a pressure that is linear in space is exact, however far above zero
+//! the pressure lies and wherever the neighbours are, even at walls, where half of them are missing. (Closed
+//! forms of what walls take hold for whole walls, but not for the places of particles: with them still water
+//! would move along edges and out of corners for ever, at 4 cm/s and more.) Such forces do not push particles
+//! apart; shifting keeps the particles evenly distributed instead ([`super::super::shifting`]). At a free
+//! surface and in spray G = −⅓ Σ V r·∇W + ⅓ tr K is small (it is 0.98 on a lattice at h = 2.6 spacings), and
+//! there pressures act as sums p_i + p_j with this key, too. Densities then follow the equation of
+//! continuity, and neither energy nor momentum is conserved by construction.
 //!
 //! Walls enter by λ, ∇λ and K in closed form ([`Coverage`](crate::sph::walls::Coverage)). They mirror the
 //! pressure and the velocity of a particle. In the depth of the fluid the pressure beyond a wall is also
@@ -41,12 +47,13 @@
 //! linear system of three unknowns for each particle at a wall; the factor (1 − K)⁻¹ solves it. (Without it
 //! water at rest keeps moving along its walls, 3 cm/s in the mean after three seconds instead of 1 cm/s, and
 //! is 14 % too light at the floor.) Spray that hits a wall has no balance, so it has no such factor, and its
-//! motion conserves energy. Particles of a surface at rest have one, or walls would not bear their share of its
-//! weight: the pressure of water eight layers deep was too high by a tenth of a layer, everywhere. Those of a
-//! surface that moves have none: a film that runs along a floor would gain energy by it, 0.5 % of what a tank had.
+//! motion conserves energy. Particles of a surface at rest have the factor, or walls would not bear their
+//! share of its weight: without it the pressure of water eight layers deep is too high by a tenth of a layer,
+//! everywhere. Particles of a moving surface do not have it: a film that runs along a floor would gain energy
+//! by it, 0.5 % of that of a tank.
 //!
-//! Along walls that let it slip the flow is mirrored: the part of the kernel inside them adds to the viscosity
-//! what the rest does.
+//! Along walls on which it slips the flow is mirrored: the part of the kernel inside them adds as much to the
+//! viscosity as the rest.
 //!
 //! Time: kick–drift–kick with one evaluation per step.
 
@@ -80,15 +87,17 @@ pub struct Weakly {
     earlier_rate: Vec<f64>,
     /// Length of the last step, s; zero at the start.
     last_dt: f64,
-    /// What else changes densities, kg/m³/s.
+    /// Rate of density by everything else, kg/m³/s.
     drift: Vec<f64>,
-    /// Densities by the places of the particles alone, kg/m³.
+    /// Densities that follow from the places of the particles alone, kg/m³.
     filled: Vec<f64>,
-    /// Σ V ∇W + ∇λ, 1/m, without what compression makes: the direction in which particles crowd; zero at the surface.
+    /// Σ V ∇W + ∇λ, 1/m, without the part due to compression: the direction in which particles crowd. It is
+    /// zero at the surface.
     crowding: Vectors,
     /// Predicted ρ − ρ₀.
     excess: Vec<f64>,
-    /// What kernels miss before a free surface, as a part of the rest density, see [`SURFACE_STEPS`].
+    /// The density that kernels miss before a free surface, as a part of the rest density. It is found every
+    /// [`SURFACE_STEPS`] steps.
     missing: Vec<f64>,
     roughness: Roughness,
     /// Working memory: the Q and the drift that a sum finds.
@@ -100,7 +109,8 @@ pub struct Weakly {
 const COLUMNS: [&str; 5] =
     ["places", "density rate", "earlier density rate", "density drift", "missing before a surface"];
 
-/// Steps after which what kernels miss before a free surface is found anew: it follows what takes some hundred steps.
+/// Number of steps after which the part that kernels miss before a free surface is found anew. The surface
+/// changes within some hundred steps.
 const SURFACE_STEPS: u64 = 8;
 
 /// Name of the length of the last step in a checkpoint.
@@ -228,8 +238,9 @@ impl Weakly {
         core.sound = numbers.sound_speed * (densest / parameters.rest_density).powi((EXPONENT - 1) / 2);
     }
 
-    /// Finds accelerations, densities and their rates at the end of a step of the length `dt`, with velocities
-    /// and densities predicted for it. The pressures of the particles become those of the predicted densities.
+    /// Finds accelerations, densities and their rates at the end of a step of the length `dt`, with
+    /// velocities and densities predicted for it. The pressures of the particles become those of the
+    /// predicted densities.
     fn find_rates(&mut self, core: &mut Core, dt: f64) {
         let n = core.particles.len();
         let mut predicted = std::mem::take(&mut core.spare);
@@ -306,12 +317,13 @@ impl Weakly {
         self.tension.act(core);
     }
 
-    /// Finds the pressures of the predicted densities, and makes of these densities what the sums read.
+    /// Finds the pressures of the predicted densities, and turns these densities into the excess that the
+    /// sums read.
     fn find_excess(&mut self, core: &Core, pressure: &mut [f64]) {
         let (numbers, parameters) = (&self.numbers, &core.parameters);
         let even = sums_crowding(numbers, core);
-        // where how particles crowd is not summed, only differences of the excess matter, so that of a fluid at
-        // rest is subtracted
+        // where the sums do not include crowding, only differences of the excess matter, so the excess in a
+        // fluid at rest is subtracted
         let (at_rest, from) = (at_rest(numbers, parameters, parameters.gravity), core.boundary.domain.min);
         let Vectors { x, y, z } = &core.particles.position;
         let places = x.par_chunks(CHUNK).zip(y.par_chunks(CHUNK)).zip(z.par_chunks(CHUNK));
