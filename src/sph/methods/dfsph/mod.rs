@@ -18,15 +18,15 @@ use crate::sph::pass::Pass;
 use crate::sph::scales::Scales;
 use crate::sph::walls::{Wall, WallKernel};
 
-/// The speed of sound by which the artificial viscosity is measured, over the greatest expected speed: that of
-/// a weakly compressible fluid, so that the same α damps alike.
+/// The speed of sound in the artificial viscosity, over the greatest expected speed. It is that of a weakly
+/// compressible fluid, so that the same α damps as much.
 const NOMINAL_SOUND: f64 = 10.0;
 
 /// Part of the spacing that a particle may cross in one step of a method without sound: the customary 0.4.
 const ADVECTION: f64 = 0.4;
 
-/// Factor of √(h/a) at the beginning of a run, when a still contains the acceleration that pressure will take
-/// away.
+/// Factor of √(h/a) at the beginning of a run, when a still contains the acceleration that pressure will
+/// cancel.
 const IMPLICIT_FORCE_FACTOR: f64 = 0.1;
 
 /// Factor of √(h/a) once the pressure is known and its acceleration is part of a. With 0.25 a column of forty
@@ -39,17 +39,17 @@ const WITH_TENSION: Support = Support::Spacings(3.0);
 /// Numbers of the divergence-free method.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Dfsph {
-    /// Mean excess of the density that is accepted, as a part of the rest density. One particle in two hundred may
-    /// exceed it by more than ten times as much. Default 1e-4.
+    /// Mean excess of the density that is accepted, as a part of the rest density. One particle in two
+    /// hundred may exceed it by more than ten times as much. Default 1e-4.
     pub tolerance: f64,
-    /// Most iterations of each of the two solves in one step; thirty times as many where no pressure is known to begin with,
-    /// as in the first step. Default 100.
+    /// Maximum number of iterations of each of the two solves in one step. A solve that begins without a
+    /// known pressure, as in the first step, may take thirty times as many. Default 100.
     pub most_iterations: u32,
     /// α of the artificial viscosity (Monaghan 1992), for a speed of sound of ten times the greatest expected
     /// speed. Default 0.06; zero: the term is not computed.
     pub artificial_viscosity: f64,
-    /// How strongly particles drift to where there are fewer of them. Default 0: no drift. 1 halves the
-    /// deviation of a fluid at rest, and makes that of a shear flow two to three times as large.
+    /// How strongly particles drift to where there are fewer of them. Default 0: no drift. A strength of 1
+    /// halves the deviation of a fluid at rest, and makes that of a shear flow two to three times as large.
     pub shifting: f64,
 }
 
@@ -137,7 +137,7 @@ impl Declaration for Dfsph {
     ];
     const OTHER_SUPPORT: Option<(Support, &'static str)> = Some((WITH_TENSION, "with surface tension"));
 
-    /// Normals and curvature need a smooth surface: with 2.2 spacings a drop stirs itself without end.
+    /// Normals and curvature need a smooth surface: with 2.2 spacings a drop never stops stirring itself.
     fn support(&self, has_tension: bool) -> Support {
         if has_tension { WITH_TENSION } else { Self::FLUID.support }
     }
@@ -185,14 +185,14 @@ impl Numerics for Dfsph {
         SOLVED_FORCE_FACTOR / IMPLICIT_FORCE_FACTOR
     }
 
-    /// The wall in layers: only with these does a divergence-free fluid have the right distance from a wall
-    /// at rest. (Differences of pressure are steady only at a continuous wall; with layers a standing wave of
-    /// `wcsph` grows noise at the walls.)
+    /// Walls consist of layers, because only with layers does a divergence-free fluid at rest have the right
+    /// distance from a wall. (Differences of pressure are steady only at a continuous wall; with layers a
+    /// standing wave of `wcsph` grows noise at the walls.)
     fn wall(&self, scales: &Scales) -> Wall {
         Wall::in_layers(WallKernel::WendlandC2, scales.support_radius, scales.spacing())
     }
 
-    /// The first solve of places spreads what is crowded then.
+    /// The first solve of places spreads crowded particles.
     fn makes_room_at_start(&self) -> bool {
         true
     }
@@ -209,7 +209,7 @@ impl Numerics for Dfsph {
         true
     }
 
-    /// Velocities change by the forces at the present places, and then carry the particles on.
+    /// Forces at the present places change the velocities, which then move the particles.
     fn is_staggered(&self) -> bool {
         true
     }

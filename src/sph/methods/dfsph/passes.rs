@@ -55,15 +55,15 @@ const LEAST_DISTANCE: f64 = 1e-6;
 /// How a linear system takes walls into account.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Continuation {
-    /// A pressure that is linear in space goes on behind the wall, and a velocity is mirrored there, by λ and M:
-    /// right for forces.
+    /// A pressure that is linear in space continues behind the wall, and a velocity is mirrored there, by λ
+    /// and M. This is right for forces.
     Linear,
-    /// As the barrier B adds to the density, and no more: right for places.
+    /// Only what the barrier B adds to the density. This is right for places.
     Barrier,
 }
 
-/// Finds the density ρ with the barriers of the walls and what is missing before a free surface, the diagonals of both
-/// systems, the direction in which particles crowd, G, and the density that the places say.
+/// Finds the density ρ with the barriers of the walls and the part missing before a free surface, the
+/// diagonals of both systems, the direction in which particles crowd, G, and the density of the places alone.
 #[derive(Clone, Copy)]
 pub(super) struct Densities<'a> {
     pub constants: Constants,
@@ -106,7 +106,7 @@ impl PairPass<0, 6, 8> for Densities<'_> {
             density += rest_density * wall.barrier.part;
             crowding += wall.gradient;
             spread += wall.share();
-            // the walls of the neighbours complete their sums about as much as those of the particle itself
+            // the neighbours' walls complete their sums about as much as the particle's walls do its own
             let others = squares * completion.determinant().max(1.0).cbrt().powi(2);
             let own = *completion * (slope + 2.0 * rest_density * wall.gradient);
             let barrier = slope + rest_density * wall.barrier.gradient;
@@ -164,9 +164,9 @@ impl PairPass<1, 3, 3> for Push<'_> {
     }
 }
 
-/// Finds the pressure at each particle as that of the fluid around it: the mean of what its neighbours' pressures continue to,
-/// Σ w·(p_j + ∇p·(x_i − x_j))/Σ w with the weights w = 1 − r/h, and ∇p = −ρ₀a by the acceleration that pressure gives the
-/// particle.
+/// Finds the pressure at each particle as that of the fluid around it. It is the mean of the neighbours'
+/// pressures, continued linearly to the particle: Σ w·(p_j + ∇p·(x_i − x_j))/Σ w with the weights w =
+/// 1 − r/h. The gradient is ∇p = −ρ₀a, from the acceleration that pressure gives the particle.
 #[derive(Clone, Copy)]
 pub(super) struct Field<'a> {
     pub kernel: Wendland,
@@ -204,10 +204,10 @@ impl PairPass<1, 5, 1> for Field<'_> {
 pub(super) struct Squeeze<'a> {
     pub constants: Constants,
     pub walls: &'a Walls,
-    /// Velocities or displacements; where they continue linearly, M·v.
+    /// Velocities or displacements; M·v where they continue linearly.
     pub velocity: &'a Vectors,
     pub continuation: Continuation,
-    /// Whether the motion of walls counts: it belongs to a velocity, and not to an acceleration by pressure.
+    /// Whether the motion of walls counts. It does for velocities, but not for accelerations by pressure.
     pub with_walls: bool,
 }
 
@@ -241,9 +241,9 @@ impl PairPass<3, 1, 1> for Squeeze<'_> {
     }
 }
 
-/// Finds the acceleration by viscosity and by gravity, and the smooth velocity around each particle. Viscosity is
-/// laminar (Monaghan & Gingold 1983), artificial (Monaghan 1992, of rough motion alone) or both; both act along the lines
-/// between particles.
+/// Finds the acceleration by viscosity and by gravity, and the smooth velocity around each particle.
+/// Viscosity is laminar (Monaghan & Gingold 1983), artificial (Monaghan 1992, for rough motion alone) or
+/// both; both act along the lines between particles.
 #[derive(Clone, Copy)]
 pub(super) struct Drag<'a, const LAMINAR: bool, const ARTIFICIAL: bool> {
     pub constants: Constants,
@@ -254,7 +254,7 @@ pub(super) struct Drag<'a, const LAMINAR: bool, const ARTIFICIAL: bool> {
     /// The factor α·h/2·c of the artificial viscosity, m²/s.
     pub artificial: f64,
     pub gravity: DVec3,
-    /// Where what walls do is noted, if it is to be.
+    /// Receives the forces of walls, if they are wanted.
     pub reaction: Option<Reaction<'a>>,
 }
 
@@ -285,7 +285,7 @@ impl<const LAMINAR: bool, const ARTIFICIAL: bool> PairPass<6, 10, 6> for Drag<'_
             }
         }
         if ARTIFICIAL {
-            // an artificial viscosity makes do with twelve bits
+            // twelve bits suffice for an artificial viscosity
             let push = f * roughness::damped(approach(3), arriving) * r2.approximate_recip();
             for k in 0..3 {
                 sums[3 + k] = push.mul_add(d[k], sums[3 + k]);

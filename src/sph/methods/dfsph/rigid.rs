@@ -15,7 +15,7 @@ pub(super) struct Rigid {
 }
 
 impl Rigid {
-    /// The motion of the particles at these places, m, with these velocities, m/s.
+    /// The motion of particles at the places `at`, m, with the given velocities, m/s.
     pub fn of(at: &Vectors, velocity: &Vectors) -> Self {
         let n = at.len().max(1) as f64;
         let all = || (0..at.len()).map(|i| (at.get(i), velocity.get(i)));

@@ -8,46 +8,51 @@
 //! x ← x + dt·v + b(s′)     s′ ≥ 0 so that ρ ≤ ρ₀ at the new place
 //! ```
 //!
-//! with s = p/ρ². Their second solver makes the density right by changing velocities, and each small error of a
-//! density becomes a speed: a fluid at rest simmers, and its pressure with it. Here it changes places, and the
-//! displacement is not part of the velocity.
+//! with s = p/ρ². In the paper the second solver corrects the density by changing velocities, so each small
+//! error of a density becomes a speed: a fluid at rest simmers, and so does its pressure. Here the second
+//! solver changes places, and the displacement is not part of the velocity.
 //!
-//! Then the density no longer tells the pressure what an unfinished solve has left, and a column could sink for
-//! ever within the tolerance while displacements lift it (a breaking dam gained 8 % of its energy so). So each
-//! particle remembers what was left as a debt D of density, and the pressure pays it back within τ
-//! (Baumgarte 1972). The tolerance of this solve is that of the density over τ. A part of what displacements take
-//! away is added to the debt, see [`OWED`].
+//! But then an error left by an unfinished solve no longer appears in the density, and the pressure cannot
+//! correct it. A column could sink for ever within the tolerance while displacements lift it (a breaking dam
+//! gained 8 % of its energy in this way). So each particle remembers the error as a debt D of density, and
+//! the pressure pays it back within τ (Baumgarte 1972). The tolerance of this solve is that of the density
+//! over τ. A part of the density that displacements take away is added to the debt, see [`OWED`].
 //!
-//! Both systems take the part of the kernel that is missing before a free surface for fluid
-//! ([`free_surface`](super::super::free_surface)), so that the outermost particles keep their distance as those in the depth do.
+//! Both systems count the part of the kernel that is missing before a free surface as fluid
+//! ([`free_surface`](super::super::free_surface)), so that the outermost particles keep the same distance as
+//! those in the depth.
 //!
 //! The two systems treat walls differently.
 //!
-//! Forces: a(s)_i = −M_i[Σ m (s_i + s_j) ∇W + 2ρ₀ s_i ∇λ] and dρ_i/dt = Σ m (w_i − w_j)·∇W + 2ρ₀ (w_i·∇λ − sweep)
-//! with M = (1 − K)⁻¹ and w = r + M·(v − r): a pressure that is linear in space continues behind the wall, and a
-//! velocity is mirrored there, as seen from the wall. Across walls r is their velocity. Along them, where the fluid slips, it
-//! is that of the fluid as a whole, so that a fluid which moves past a wall is not stirred by
-//! the disorder of M ([`Rigid`]). What pressure does to w is M·a, so the system is symmetric and has no negative
-//! eigenvalue for any vessel, and its solution adds no energy. (With r = 0 water that moved with its tank at 5 m/s was stirred to
-//! 0.9 m/s. On a still column, with λ and ∇λ alone, the pressure of the first layer comes out 2.2 times too high, and
-//! in a narrow vessel all of it by 20 %.)
+//! Forces: a(s)_i = −M_i[Σ m (s_i + s_j) ∇W + 2ρ₀ s_i ∇λ] and dρ_i/dt = Σ m (w_i − w_j)·∇W + 2ρ₀
+//! (w_i·∇λ − sweep) with M = (1 − K)⁻¹ and w = r + M·(v − r). A pressure that is linear in space continues
+//! behind the wall, and a velocity is mirrored there, as seen from the wall. Across walls r is their
+//! velocity. Along walls, where the fluid slips, r is the velocity of the fluid as a whole, so that the
+//! disorder of M does not stir a fluid that moves past a wall ([`Rigid`]). Pressure changes w by M·a, so the
+//! system is symmetric and has no negative eigenvalue for any vessel, and its solution adds no energy. (With
+//! r = 0 water that moves with its tank at 5 m/s is stirred to 0.9 m/s. On a still column, with λ and ∇λ
+//! alone, the pressure of the first layer comes out 2.2 times too high. In a narrow vessel all pressures are
+//! too high by 20 %.)
 //!
-//! Places: ρ_i = Σ m W + ρ₀ B with the barrier B of [`OfFace`](crate::sph::walls::OfFace), which is a lattice's part where a
-//! fluid at rest touches the wall, and b(s′) by its derivative, exact for each face. The solve therefore meets the
-//! density that is found next, up to the square of the displacement. (With the system of forces a breaking dam
-//! keeps three times the tolerance.) What is missing before a free surface is that at the present places, so near one the
-//! solve meets the next density up to what changes there in a step.
+//! Places: ρ_i = Σ m W + ρ₀ B with the barrier B of [`OfFace`](crate::sph::walls::OfFace), which equals a
+//! lattice's part where a fluid at rest touches the wall. b(s′) follows from the derivative of B, which is
+//! exact for each face. The solve therefore reaches the density that is found next, up to the square of the
+//! displacement. (With the system of forces a breaking dam keeps three times the tolerance.) The part missing
+//! before a free surface is that at the present places, so near a surface the density also differs by the
+//! change of this part in a step.
 //!
-//! Artificial viscosity of rough motion ([`roughness`]) takes the noise of the particles' disorder, which nothing else would
-//! take from a fluid without viscosity. Both viscosities act along the lines between particles, and conserve
-//! momentum and angular momentum.
+//! Artificial viscosity of rough motion ([`roughness`]) damps the noise of the particles' disorder, which
+//! nothing else would damp in a fluid without viscosity. Both viscosities act along the lines between
+//! particles, so they conserve momentum and angular momentum.
 //!
-//! The pressure of a particle is G·ρ²s, because the sums make G·∇p of a pressure that is linear in
-//! space (G = 0.98 in the depth of a fluid that has left the lattice). It is averaged over τ, because the
-//! divergence of velocity that one step leaves is a pressure in the next. The reported one is that of the field around the
-//! particle ([`Field`]): what keeps the density of one particle differs from its neighbours' by a fifth of a layer's weight, in
-//! still water too, where these differences balance each other. It is averaged over less where particles move fast: water that
-//! runs up a wall would carry the pressure of its impact along, and the mean over the wall would be twice the force on it.
+//! The pressure of a particle is G·ρ²s, because for a pressure that is linear in space the sums give G·∇p (G
+//! = 0.98 in the depth of a fluid that has left the lattice). It is averaged over τ, because the divergence
+//! of velocity that one step leaves becomes a pressure in the next. The reported pressure is that of the
+//! field around the particle ([`Field`]). The pressures that keep the densities of neighbouring particles
+//! differ by a fifth of a layer's weight, even in still water, where these differences balance each other.
+//! Where particles move fast, reported pressures are averaged over a shorter time. Otherwise water that runs
+//! up a wall would carry the pressure of its impact along, and the mean over the wall would be twice the
+//! force on it.
 //!
 //! Invariant: the densities are those of the present positions.
 
@@ -76,56 +81,59 @@ use crate::sph::{
     reaction::Reaction,
 };
 
-/// The relaxation time, in steps, where the fastest particle moves as far in a step as it may.
+/// The relaxation time, in steps, if the fastest particle moves as far in a step as allowed.
 const RELAXATION_STEPS: f64 = 8.0;
 
-/// The relaxation time at rest, in units of √(h/g), however short the steps are: the debt of a whole column is paid
-/// at once, and with eight steps a column of eighty layers bursts at its start.
+/// The relaxation time at rest, in units of √(h/g), however short the steps are. The debt of a whole column
+/// is paid at once, so with eight steps a column of eighty layers bursts at its start.
 const RELAXATION_FALLS: f64 = 2.0;
 
-/// A relaxation time has at most so many of the steps that the motion allows, which bounds it where gravity is close to zero.
-/// The steps themselves pressure makes shorter, and a relaxation time that followed them would make the pressure grow without end.
+/// Maximum relaxation time, in steps of the length that the motion allows. It bounds the time where gravity
+/// is close to zero. Pressure makes the steps themselves shorter; a relaxation time that followed them would
+/// make the pressure grow without end.
 const MOST_RELAXATION_STEPS: f64 = 100.0;
 
-/// How many times as many iterations, and how much smaller an error, a solve has that begins with no pressure anywhere, as in
-/// the first step: a new column has all of its weight to find. With those of other steps a column of
-/// sixty layers, whose pressure comes too late, falls and bursts.
+/// Factors of the number of iterations and of the tolerance for a solve that begins without any pressure, as
+/// in the first step, where the whole weight of a column must be found. Without them the pressure of a column
+/// of sixty layers comes too late, and the column falls and bursts.
 const FIRST_ITERATIONS: u32 = 30;
 const FIRST_TOLERANCE: f64 = 0.1;
 
-/// Part of a density that displacements take away which becomes a debt. Without it a column of forty layers, ten
-/// wide, sinks at 0.3 m/s with a velocity in which the system of forces sees no divergence, and displacements
-/// cannot hold it. With all of it, and with a third, a column of eighty layers, eight wide, bursts at its start.
+/// Part of the density taken away by displacements that becomes a debt. Without it a column of forty layers,
+/// ten wide, sinks at 0.3 m/s with a velocity in which the system of forces sees no divergence, and
+/// displacements cannot hold it. With all of it, and with a third, a column of eighty layers, eight wide,
+/// bursts at its start.
 pub(super) const OWED: f64 = 0.6;
 
-/// The part of 2/ω that a step may be long, for the fastest motion that pressure causes and that the solver
-/// does not see. (Eight layers lie still with 0.75 and burst with 1, as a column of eighty does.)
+/// Longest step, as a part of 2/ω, for the fastest motion that pressure causes and that the solver does not
+/// see. (Eight layers lie still with 0.75 and burst with 1, as a column of eighty does.)
 const STABLE: f64 = 0.75;
 
-/// ω² beside walls over that in the depth, for each unit of ‖M‖²: M completes an acceleration there, and changes with the
-/// place as M∇K·M does. ‖M‖ is 2 at a plane, 2.8 in the corner of a box and 4 in a gap one spacing wide. Without it water that
-/// tapers off between a cylinder and a floor reaches 60 m/s, and columns of sixty and seventy layers, four wide, burst.
+/// ω² beside walls over ω² in the depth, for each unit of ‖M‖². M completes an acceleration beside walls, and
+/// changes with the place as M∇K·M does. ‖M‖ is 2 at a plane, 2.8 in the corner of a box and 4 in a gap one
+/// spacing wide. Without this factor water that tapers off between a cylinder and a floor reaches 60 m/s, and
+/// columns of sixty and seventy layers, four wide, burst.
 const STIFFER_AT_WALLS: f64 = 0.375;
 
-/// The scheme. It keeps the pressures, and what is owed, between steps; the rest is working memory.
+/// The scheme. It keeps pressures and debts between steps; the rest is working memory.
 pub struct DivergenceFree {
     pub(super) numbers: Dfsph,
     /// Finds pressures that change velocities; its answer is p/ρ².
     forces: Solver,
     /// Finds pressures that displace particles.
     places: Solver,
-    /// The density, kg/m³, that each particle would have gained by what the solver of forces left.
+    /// The density, kg/m³, that each particle would have gained by the errors that the solver of forces left.
     pub(super) debt: Vec<f64>,
     /// The pressure that each particle bears, Pa, averaged over the relaxation time.
     pub(super) own_pressure: Vec<f64>,
-    /// How stiff a lattice of these particles is, see [`Wendland::lattice_stiffness`].
+    /// Stiffness of a lattice of these particles, see [`Wendland::lattice_stiffness`].
     stiffness: f64,
     /// G = −⅓ Σ V r·∇W + ⅓ tr K of each particle.
     spread: Vec<f64>,
     /// Σ V ∇W + ∇λ, 1/m; zero at the surface.
     crowding: Vectors,
-    /// What a solver shall take away: a rate of density, or an excess of density. Between the two solves it holds the pressures
-    /// that the particles bear in this step, Pa.
+    /// Right-hand side of a solve: a rate of density, or an excess of density. Between the two solves it
+    /// holds the pressures that the particles bear in this step, Pa.
     free: Vec<f64>,
     /// Pressures around the particles in this step, Pa.
     field: Vec<f64>,
@@ -133,15 +141,15 @@ pub struct DivergenceFree {
     roughness: Roughness,
     /// Displacements of this step that are not part of the velocity, m.
     pub(super) displacement: Vectors,
-    /// Velocities with what displaces besides, m/s.
+    /// Velocities including the drift by shifting, m/s.
     drift: Vectors,
-    /// Densities with the barriers of the walls and what is missing before a free surface, kg/m³: what must not exceed
-    /// that at rest.
+    /// Densities with the barriers of the walls and the part missing before a free surface, kg/m³. They must
+    /// not exceed the rest density.
     pub(super) loaded: Vec<f64>,
     pub(super) walls: Walls,
     /// The motion of the fluid as a whole at the beginning of the step.
     whole: Rigid,
-    /// What kernels miss before a free surface.
+    /// The part of kernels that is missing before a free surface.
     surface: FreeSurface,
     /// Iterations of the last step's solvers.
     pub(super) iterations: u32,
@@ -149,8 +157,8 @@ pub struct DivergenceFree {
     last_dt: f64,
 }
 
-/// The part of a force that depends on the place with which it acts in a step, at most: a step may be a small rest before a
-/// frame, in which the force of half of a usual step would be the pressure of a hundred.
+/// Greatest factor of a force that depends on the place. A step may be a short remainder before a frame; the
+/// force of half a usual step would then need a pressure a hundred times as large.
 const MOST_CARRIED: f64 = 2.0;
 
 /// Name of the length of the last step in a checkpoint.
@@ -160,7 +168,8 @@ impl Scheme for DivergenceFree {
     fn step(&mut self, core: &mut Core, most: f64) -> Result<f64, StepError> {
         core.pressure_dt = self.pressure_dt(core);
         let dt = core.next_dt(most)?;
-        // before gravity pulls: what it does in a step, and pressure takes back, is no motion along walls
+        // before gravity pulls: the velocity that gravity adds in a step and pressure takes back is no motion
+        // along walls
         self.whole = Rigid::of(&core.particles.position, &core.particles.velocity);
         self.find_other_accelerations(core, dt);
         add_scaled(&mut core.particles.velocity, &core.acceleration, dt);
@@ -264,7 +273,7 @@ impl DivergenceFree {
         scheme
     }
 
-    /// Finds what follows from the number of spacings per support radius.
+    /// Finds the quantities that depend on the number of spacings per support radius.
     pub(super) fn find_lattice(&mut self, parameters: &Parameters) {
         let ratio = parameters.support_radius / parameters.spacing();
         self.stiffness = Wendland::lattice_stiffness(ratio).max(0.0);
@@ -272,8 +281,8 @@ impl DivergenceFree {
     }
 
     /// The longest step, s, in which planes of particles that the present pressure holds together do not
-    /// overshoot. The solver does not see a motion that changes no density, so the forces on it are those of the
-    /// last places, and it grows where steps are longer than 2/ω.
+    /// overshoot. The solver does not see a motion that changes no density, so its forces are those at the
+    /// last places, and the motion grows if steps are longer than 2/ω.
     fn pressure_dt(&self, core: &Core) -> f64 {
         let rest = core.parameters.rest_density;
         let in_the_depth = self.own_pressure.iter().copied().fold(0.0, f64::max);
@@ -350,9 +359,10 @@ impl DivergenceFree {
             z.fill(g.z);
         }
         core.acceleration = acceleration;
-        // Under a force that changes with the place, velocities are those of the middle of a step, and it carries them on from that
-        // of the last step. Steps differ in length as the fluid slows down and falls again: with the whole of each, a
-        // ball of water that swung through the middle of a trap lost a tenth of its energy in three periods. (After uniform
+        // Under a force that changes with the place, velocities are those of the middle of a step, and the
+        // force advances them from the middle of the last step. Steps differ in length as the fluid slows
+        // down and falls again: if the force acted for the whole of each step, a ball of water that swings
+        // through the middle of a trap would lose a tenth of its energy in three periods. (After uniform
         // gravity velocities are those of the end of a step, whatever its length.)
         core.pull((0.5 * (self.last_dt + dt) / dt).min(MOST_CARRIED));
         self.tension.act(core);
@@ -362,7 +372,7 @@ impl DivergenceFree {
     fn keep_density(&mut self, core: &mut Core, dt: f64) {
         let rest = core.parameters.rest_density;
         let relaxation = relaxation_time(&core.parameters, core.speed, dt);
-        // the compression to come without pressure; each iteration finds what s takes away
+        // the compression without pressure; each iteration finds how much of it s takes away
         self.forces.find_rate_of(core, &self.walls, &core.particles.velocity, RateOf::Velocity(&self.whole));
         let wanted = |rho: f64, debt: f64| ((rho - rest).min(0.0) + debt) / relaxation;
         self.free.clear();
@@ -375,8 +385,8 @@ impl DivergenceFree {
                 .zip(&self.debt)
                 .map(|((rate, rho), debt)| rate + wanted(*rho, *debt)),
         );
-        // What a step leaves becomes a debt, which the next ones pay back: of eight tolerances at most where this goes on and on.
-        // What is promised of densities is a matter of the places alone.
+        // The error that a step leaves becomes a debt, which the next steps pay back. Even if every step
+        // leaves one, the debt is at most eight tolerances. Only positions guarantee the density.
         let mut goal = Goal {
             tolerance: RELAXATION_STEPS * self.numbers.tolerance * rest / relaxation,
             most_iterations: self.numbers.most_iterations,
@@ -398,8 +408,8 @@ impl DivergenceFree {
         self.report_pressure(core, dt, relaxation);
     }
 
-    /// Averages the pressures over the relaxation time, and the reported ones over no more than the time in which a particle
-    /// moves by a spacing.
+    /// Averages the pressures over the relaxation time, and the reported ones over at most the time in which
+    /// a particle moves by a spacing.
     fn report_pressure(&mut self, core: &mut Core, dt: f64, relaxation: f64) {
         let (s, density) = (&self.forces.s, &core.particles.density);
         self.free.clear();
@@ -422,13 +432,14 @@ impl DivergenceFree {
         let Particles { position, velocity, pressure, .. } = &mut core.particles;
         for (i, (mean, now)) in pressure.iter_mut().zip(&self.field).enumerate() {
             let speed = (velocity.get(i) - self.whole.at(position.get(i))).length();
-            // what a particle bore a spacing ago is the pressure of another place
+            // the pressure that a particle bore a spacing ago belongs to another place
             *mean += share.max((dt * speed / spacing).min(1.0)) * (now - *mean);
         }
     }
 
-    /// Finds the displacements of a step of the length dt: by shifting, and those that keep densities at the
-    /// new places from exceeding that at rest. The part `owed` of what these take away becomes a debt.
+    /// Finds the displacements of a step of the length dt: those by shifting, and those that keep densities
+    /// at the new places from exceeding the rest density. The part `owed` of the density that the latter take
+    /// away becomes a debt.
     pub(super) fn find_displacements(&mut self, core: &Core, dt: f64, owed: f64) {
         self.drift.clone_from(&core.particles.velocity);
         if let Some((crowding, factor)) = shift(self.numbers.shifting, &self.crowding, core) {
@@ -470,14 +481,15 @@ fn square_of_norm(matrix: &DMat3) -> f64 {
     entries.iter().map(|x| x * x).sum::<f64>().sqrt().powf(0.25)
 }
 
-/// The time, s, in which a debt is paid back, after a step of the length `dt` with this greatest speed. Reported
-/// pressures are averaged over no more than that time.
+/// The time, s, in which a debt is paid back after a step of the length `dt` with the greatest speed `speed`.
+/// Reported pressures are averaged over at most this time.
 ///
-/// A step may be short for other reasons than the motion of the fluid: a frame is due, a body jumps, or what a body did made
-/// an acceleration large. A debt that were paid back within eight such steps would become a speed without bound (a still
-/// fluid with frames 0.1 ms apart reached 11 m/s), so it has the time that eight steps of the expected motion take.
+/// A step may be short for other reasons than the motion of the fluid: a frame is due, a body jumps, or a
+/// body causes a large acceleration. A debt that was paid back within eight such steps would become a speed
+/// without bound (a still fluid with frames 0.1 ms apart reached 11 m/s). So the time is at least that of
+/// eight steps of the expected motion.
 fn relaxation_time(parameters: &Parameters, speed: f64, dt: f64) -> f64 {
-    // where nothing is expected to move, steps have no length of their own but that between frames
+    // where nothing is expected to move, only frames limit the steps
     let allowed = parameters.time_step.min(parameters.stable_dt(speed));
     let most = MOST_RELAXATION_STEPS * allowed;
     let gravity = parameters.gravity.length().max(parameters.most_gravity);
@@ -497,7 +509,8 @@ mod tests {
 
     use super::*;
 
-    /// Pressure makes steps short, and a debt must not become a greater speed by that, whatever gives the fluid its weight.
+    /// Pressure makes steps short. A debt must not become a greater speed by that, whatever gives the fluid
+    /// its weight.
     #[test]
     fn a_relaxation_time_does_not_follow_steps_that_pressure_made_short() {
         let of = |gravity: f64, most_gravity: f64, dt: f64| {
@@ -518,7 +531,7 @@ mod tests {
                 assert!((found / (RELAXATION_FALLS * fall) - 1.0).abs() < 1e-12, "{gravity} {dt}: {found} s");
             }
         }
-        // without weight it is that of the expected motion
+        // without weight it is the time of the expected motion
         assert!(of(0.0, 0.0, 1e-7) < 0.5 * fall && of(0.0, 0.0, 1e-7) == of(0.0, 0.0, 1e-5));
     }
 

@@ -1,4 +1,4 @@
-//! The solver of a linear system for s ≥ 0, of which there are two: one for velocities and one for places.
+//! The solver of a linear system for s ≥ 0. There are two systems: one for velocities and one for places.
 
 use glam::DVec3;
 use rayon::prelude::*;
@@ -14,15 +14,16 @@ use crate::sph::{
     walls::Pushed,
 };
 
-/// Factor by which walls and disorder make a system stiffer than the even fluid of [`stiffness`], first for velocities that
-/// continue behind walls, then for places. The factors that need the fewest iterations; a system that is stiffer is noticed.
+/// Factor by which walls and disorder make a system stiffer than the even fluid of [`stiffness`], first for
+/// velocities that continue behind walls, then for places. These factors need the fewest iterations. A solve
+/// notices if its system is stiffer.
 const STIFFNESS: [f64; 2] = [1.5, 0.8];
 
 /// Part of an increased stiffness that the next solve keeps.
 const FORGET: f64 = 0.97;
 
-/// A particle whose diagonal is below this part of that in a full neighbourhood has no neighbours, and no
-/// pressure is solved for.
+/// A particle whose diagonal is below this part of that in a full neighbourhood counts as alone, and gets no
+/// pressure.
 const LONELY: f64 = 1e-3;
 
 /// One system, its last answer, and working memory.
@@ -30,17 +31,17 @@ pub(super) struct Solver {
     continuation: Continuation,
     /// The answer s: p/ρ² where it changes velocities.
     pub s: Vec<f64>,
-    /// The diagonal of the system: how much a unit of s lowers the particle's own dρ/dt in a second.
+    /// The diagonal of the system: the decrease of the particle's own dρ/dt in a second by a unit of s.
     pub factor: Vec<f64>,
     /// a(s), the acceleration or displacement that belongs to the answer.
     pub push: Vectors,
-    /// Rate of density dρ/dt of the last velocity that was asked for.
+    /// Rate of density dρ/dt of the last velocity passed to `find_rate_of`.
     pub rate: Vec<f64>,
     /// M·v, where velocities continue linearly.
     completed: Vectors,
     /// The last guess, without the momentum that was added to it.
     last: Vec<f64>,
-    /// Greatest eigenvalue of the system over its diagonal: the inverse of a step that cannot overshoot.
+    /// Greatest eigenvalue of the system over its diagonal. Its inverse is a step that cannot overshoot.
     pub stiffness: f64,
     /// Sums of the errors and of the momentum's work, chunk by chunk.
     errors: Vec<(Errors, f64)>,
@@ -55,21 +56,21 @@ pub(super) enum Begin {
     Nothing,
 }
 
-/// What a rate of density belongs to.
+/// The vectors to which a rate of density belongs.
 #[derive(Clone, Copy)]
 pub(super) enum RateOf<'a> {
-    /// Velocities of a fluid that moves as a whole like this, beside walls with motions of their own.
+    /// Velocities of a fluid with this motion as a whole, beside walls that may move.
     Velocity(&'a Rigid),
-    /// Accelerations or displacements by pressure, in which walls have no part.
+    /// Accelerations or displacements by pressure, which walls do not share.
     Pressure,
 }
 
-/// What a solve must reach.
+/// The goal of a solve.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Goal {
     /// Mean error that is accepted. One particle in two hundred may be off by more than ten times as much.
     pub tolerance: f64,
-    /// Most iterations.
+    /// Maximum number of iterations.
     pub most_iterations: u32,
 }
 
@@ -101,7 +102,7 @@ impl Errors {
 }
 
 impl Solver {
-    /// The solver for n particles, which knows no answer yet.
+    /// The solver for n particles, without an answer yet.
     pub fn new(continuation: Continuation, parameters: &Parameters, n: usize) -> Self {
         let mut solver = Self {
             continuation,
@@ -119,8 +120,8 @@ impl Solver {
     }
 
     /// Finds s ≥ 0 such that the rate of density `free` + dt·(rate of a(s)) vanishes where s > 0 and is not
-    /// positive elsewhere, beginning with what `s` holds, or with nothing. Leaves a(s) in `push` and its rate in `rate`, and
-    /// returns the number of iterations.
+    /// positive elsewhere. It begins with the present `s`, or with zero. Leaves a(s) in `push` and its rate
+    /// in `rate`, and returns the number of iterations.
     ///
     /// The method is projected gradients with momentum (Nesterov 1983), scaled by the diagonal, and restarted
     /// when the momentum leads uphill (O'Donoghue & Candès 2015). It takes some √κ iterations where Jacobi's
@@ -134,13 +135,13 @@ impl Solver {
         goal: Goal,
         begin: Begin,
     ) -> u32 {
-        // what one neighbourhood needed is forgotten again
+        // the stiffness that one neighbourhood needed is forgotten again
         self.stiffness = (FORGET * self.stiffness).max(least_stiffness(self.continuation, &core.parameters));
         let least = LONELY * Constants::of(&core.parameters).full_factor;
         let n = self.s.len();
         let (mut iteration, mut momentum, mut best) = (0, 0.0, f64::INFINITY);
         if begin == Begin::Nothing {
-            // no pressure changes nothing, so the first guess needs no sums
+            // zero pressure has no effect, so the first guess needs no sums
             self.s.fill(0.0);
             self.rate.fill(0.0);
             self.last.clone_from(&self.s);
@@ -174,7 +175,7 @@ impl Solver {
         iteration
     }
 
-    /// The errors at a guess, and a sum that is above zero if momentum leads uphill from it.
+    /// The errors at a guess, and a sum that is positive if momentum leads uphill from there.
     fn find_errors(&mut self, free: &[f64], dt: f64, least: f64, goal: Goal) -> (Errors, f64) {
         let scale = 1.0 / (dt * self.stiffness);
         self.rate
@@ -263,8 +264,8 @@ impl Solver {
         core.sum(&pass, [&x[..], y, z], [&mut self.rate]);
     }
 
-    /// Notes what walls have of a(s), where it changes velocities of a fluid with this rest density, kg/m³: a(s) = M·(a of the
-    /// pairs − 2ρ₀s·∇λ).
+    /// Notes the part of the walls in a(s) = M·(a of the pairs − 2ρ₀s·∇λ), for the system that changes
+    /// velocities. The rest density is in kg/m³.
     pub fn note_walls(&self, reaction: Reaction<'_>, walls: &Walls, rest_density: f64) {
         walls.found().par_iter().with_min_len(CHUNK / 4).for_each(|(i, wall, completion)| {
             let i = *i as usize;
@@ -302,7 +303,7 @@ fn least_stiffness(continuation: Continuation, parameters: &Parameters) -> f64 {
 }
 
 /// Greatest eigenvalue over diagonal in an even fluid with `ratio` spacings per support radius. It belongs to
-/// waves of pressure of the length 1.65 h, by quadrature of (∫ ∇W sin kx)²·ρ/m / ∫|∇W|².
+/// pressure waves of the length 1.65 h, and was found by quadrature of (∫ ∇W sin kx)²·ρ/m / ∫|∇W|².
 fn stiffness(ratio: f64) -> f64 {
     1.775 * (0.5 * ratio).powi(3)
 }

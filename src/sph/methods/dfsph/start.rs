@@ -1,12 +1,13 @@
-//! What happens to the particles of a fluid before its first step.
+//! Spreads and packs the particles of a fluid before its first step.
 //!
-//! A lattice fits few walls. Where particles are too dense they are moved apart, or else the first step would give them
-//! speeds, and a weakly compressible fluid would grow until it has the room that it needs (beside the walls of a bent
-//! tube by 3 % of its volume). A fluid with a surface has room for that. A fluid that fills its vessel has none: its particles are packed,
-//! x ← x − β·h²·(Σ V ∇W + ∇B), until they lie evenly and as far from curved walls as these demand. What is too dense
-//! then cannot get less dense by moving, so all particles become a little lighter. (The flow between two cylinders, 8
-//! spacings apart, loses 4 % of its mass so. If particles that are too near to a wall are left out, it loses 13 %, and
-//! gaps beside the walls make its velocity wrong by 44 % instead of 9.)
+//! A lattice fits few walls. Particles that are too dense are moved apart. Otherwise the first step would
+//! give them speeds, and a weakly compressible fluid would grow until it has the room that it needs (beside
+//! the walls of a bent tube by 3 % of its volume). A fluid with a surface has room for that. A fluid that
+//! fills its vessel has none. Its particles are packed, x ← x − β·h²·(Σ V ∇W + ∇B), until they lie evenly and
+//! keep the distance that curved walls demand. If it is too dense then, moving particles does not help, so
+//! all particles become a little lighter. (The flow between two cylinders, 8 spacings apart, loses 4 % of its
+//! mass in this way. If particles that are too near to a wall are left out instead, it loses 13 %, and gaps
+//! beside the walls make its velocity wrong by 44 % instead of 9.)
 
 use std::collections::HashMap;
 
@@ -23,38 +24,39 @@ use crate::sph::{
     particles::{Particles, Vectors},
 };
 
-/// Most rounds in which particles are moved apart; the compression that is left then is small.
+/// Maximum number of rounds that move particles apart; little compression is left after them.
 const ROUNDS: usize = 40;
 
-/// Most rounds of packing.
+/// Maximum number of packing rounds.
 const PACKING_ROUNDS: usize = 100;
 
 /// β: how far packing moves particles in a round. With 0.2 they swing instead of coming to rest.
 const PACKING_FACTOR: f64 = 0.05;
 
-/// Mean excess of the density from which on what moving apart takes away is no debt of the first steps. (Particles in a bent tube,
-/// 3 % too dense, would gain 0.8 % of their energy from it. A column of forty layers whose places have a jitter of a twentieth
-/// of the spacing needs it: without that push its pressure comes too late, and it bursts.)
+/// If the mean excess of the density is above this, the density that moving apart takes away does not become
+/// a debt of the first steps. (Particles in a bent tube, 3 % too dense, would gain 0.8 % of their energy from
+/// the debt. A column of forty layers whose places have a jitter of a twentieth of the spacing needs the
+/// debt: without its push the pressure comes too late, and the column bursts.)
 const CROWDED: f64 = 0.01;
 
 /// Packing ends when no particle moves farther than this part of the spacing in a round.
 const PACKED: f64 = 1e-3;
 
-/// The part of the particles that are not denser than the fluid at rest once it is packed. With a half of them the flow
-/// between cylinders throws particles, with four fifths it does not.
+/// Part of the particles that are at most as dense as the fluid at rest after packing. With a half, the flow
+/// between cylinders throws particles; with four fifths it does not.
 const FITTING: f64 = 0.95;
 
-/// The part of its mass at most that a fluid without a surface keeps. A lattice that fills a box to its walls is as dense as it
-/// may be, and denser in any other order: once it flows, displacements cannot take that away, and what they owe becomes
-/// pressure without end. (A box of 512 particles bursts within a second at rest, and in fifteen steps in a slow vortex; with
-/// 0.98 the vortex still does. Packed vessels of other shapes come to 0.945 to 0.96 by themselves.)
+/// Largest part of its mass that a fluid without a surface keeps. A lattice that fills a box to its walls has
+/// the greatest allowed density, and any other arrangement is denser. Once the fluid flows, displacements
+/// cannot remove this excess, and their debt makes the pressure grow without end. (A box of 512 particles
+/// bursts within a second at rest, and in fifteen steps in a slow vortex. With 0.98 the vortex still bursts.
+/// Packed vessels of other shapes reach 0.945 to 0.96 by themselves.)
 const SLACK: f64 = 0.95;
 
-/// The mean compression that may be left in a fluid of another method: a tenth of what such a fluid is compressed by its
-/// motion.
+/// Mean compression that may be left in a fluid of another method: a tenth of the compression by its motion.
 const SPREAD_TOLERANCE: f64 = 1e-3;
 
-/// Most iterations in each round for a fluid of another method.
+/// Maximum number of iterations in each round for a fluid of another method.
 const SPREAD_ITERATIONS: u32 = 30;
 
 /// Finds how particles crowd: Σ V ∇W + ∇B, 1/m, with the barrier B of the walls.
@@ -83,7 +85,8 @@ impl PairPass<0, 3, 3> for Packing<'_> {
     }
 }
 
-/// Moves those particles of a new fluid apart that are too dense, whatever its method. Its velocities and densities stay.
+/// Moves apart the particles of a new fluid that are too dense, whatever its method. Velocities and densities
+/// stay.
 pub(in crate::sph::methods) fn spread(core: &mut Core) {
     let Particles { density, id, .. } = &core.particles;
     let densities: HashMap<u32, f64> = id.iter().copied().zip(density.iter().copied()).collect();
@@ -94,12 +97,13 @@ pub(in crate::sph::methods) fn spread(core: &mut Core) {
     core.exchange_wall(own_wall);
     let Particles { density, id, .. } = &mut core.particles;
     density.clear();
-    // those without a density get one from their method
+    // particles without a density get one from their method
     density.extend(id.iter().map(|id| densities.get(id).copied().unwrap_or(0.0)));
 }
 
 impl DivergenceFree {
-    /// Packs the particles of a fluid without a surface, and moves those apart that are too dense. Their velocities stay.
+    /// Packs the particles of a fluid without a surface, and moves apart those that are too dense. Velocities
+    /// stay.
     pub(super) fn settle_in(&mut self, core: &mut Core) {
         let mut velocity = core.particles.velocity.clone();
         let speed = std::mem::take(&mut core.speed);
@@ -146,27 +150,28 @@ impl DivergenceFree {
             if worst < 2.0 * self.numbers.tolerance {
                 break;
             }
-            // what later rounds take away the earlier ones have brought
+            // the density that later rounds take away was added by earlier ones, so it is not owed
             let owed = if round == 0 { OWED } else { 0.0 };
-            // walls that move do not sweep before the first step
+            // before the first step moving walls do not sweep
             self.find_displacements(core, 0.0, owed);
             let moves = self.displacement.iter().any(|way| way != DVec3::ZERO);
             if moves && !self.displace(core, 1.0, velocity) {
                 break;
             }
         }
-        // where nothing weighs on the particles there is no pressure that could come too late
+        // without weight there is no pressure that could come too late
         if is_crowded || !core.has_weight() {
             self.debt.fill(0.0);
         }
     }
 
-    /// Moves the particles by their displacements times a factor. `velocity`, which they will have, is sorted as they are.
-    /// Returns whether that was possible: the first step will report a place at which an obstacle has no value.
+    /// Moves the particles by their displacements times a factor. `velocity`, which they will have, is sorted
+    /// with them. Returns whether the move was possible; if an obstacle has no value at a place, the first
+    /// step will report it.
     fn displace(&mut self, core: &mut Core, factor: f64, velocity: &mut Vectors) -> bool {
         let moved = core.drift(1.0, Some((&self.displacement, factor))).is_ok();
         if moved {
-            // a particle that was stopped by a wall has not got a speed
+            // a wall that stops a particle must not give it a speed
             core.particles.velocity.components_mut().into_iter().for_each(|column| column.fill(0.0));
             self.settle(core, &mut velocity.components_mut());
         }

@@ -31,7 +31,7 @@ impl Walls {
         let n = core.particles.len();
         self.found.clear();
         self.found.par_extend((0..n).into_par_iter().with_min_len(CHUNK / 4).filter_map(|i| {
-            // without viscosity nothing asks for friction
+            // without viscosity friction is not needed
             let wall: WallsNear = if core.parameters.viscosity > 0.0 {
                 core.coverage_with(i)?
             } else {
@@ -64,8 +64,8 @@ impl Walls {
         }
     }
 
-    /// Writes r + M·(v − r) of each particle to `completed`, where r is the velocity behind the walls: across them that of the
-    /// walls, and along them that of the fluid as a whole.
+    /// Writes r + M·(v − r) of each particle to `completed`, where r is the velocity behind the walls. Across
+    /// the walls it is their velocity, and along them that of the fluid as a whole.
     pub fn complete_velocities(&self, v: &Vectors, (at, whole): (&Vectors, &Rigid), completed: &mut Vectors) {
         completed.clone_from(v);
         for (i, wall, completion) in &self.found {
