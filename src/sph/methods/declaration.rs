@@ -55,7 +55,7 @@ pub enum Value<M: 'static> {
         get: fn(&M) -> Option<f64>,
         /// Sets the number.
         set: fn(&mut M, f64),
-        /// How the number is derived if it is not stated, in words; empty if it never is.
+        /// How the number is derived if it is not stated, in words; empty if it never is derived.
         derived: &'static str,
     },
     /// A whole number of at least `least`.
@@ -139,11 +139,12 @@ pub(in crate::sph) trait Declaration: Default + 'static {
     const PASSES: &'static [(Pass, Absence<Self>)];
     /// Columns of a checkpoint besides those that every method has.
     const SAVES: &'static [&'static str];
-    /// When [`Declaration::support`] is not that of the fluid's defaults, in words, and what it is then.
+    /// Another support radius than that of the fluid's defaults, and when [`Declaration::support`] returns
+    /// it, in words.
     const OTHER_SUPPORT: Option<(Support, &'static str)> = None;
 
-    /// Settles the numbers that are not stated and depend on whether the fluid of a scene has a free surface. To look
-    /// for one takes time, so a method does it only if it must.
+    /// Settles the numbers that are not stated and depend on whether the fluid of a scene has a free surface.
+    /// The search for one takes time, so a method asks only if it must.
     fn settle(&mut self, _scales: &Scales, _has_surface: &dyn Fn() -> bool) {}
 
     /// The support radius that suits these numbers, for a fluid with surface tension or without.
@@ -252,7 +253,7 @@ pub struct MethodInfo {
     pub passes: Vec<Pass>,
     /// Names of the columns that the method adds to a checkpoint.
     pub saves: &'static [&'static str],
-    /// Another support radius than that of the fluid's defaults, and when that is so.
+    /// Another support radius than that of the fluid's defaults, and when it is used.
     pub other_support: Option<(Support, &'static str)>,
 }
 

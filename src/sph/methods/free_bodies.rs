@@ -1,11 +1,12 @@
 //! Bodies of fluid that touch no wall, as drops and jets do, and the balance of the forces within them.
 //!
-//! The tension of a closed surface has no resultant and no torque, ∮ κ n dA = 0 and ∮ x × κ n dA = 0, but a
-//! sum over particles has: a round drop set itself in motion and began to spin. Among all changes that remove
-//! the resultant and the torque, the smallest one, weighted by how far particles belong to the surface, is a
-//! rigid acceleration w·(α + β × (x − c)). It is a small part of the force, for each body on its own.
+//! The tension of a closed surface has no resultant and no torque, ∮ κ n dA = 0 and ∮ x × κ n dA = 0. A sum
+//! over particles has both, so a round drop would set itself in motion and begin to spin. Among all changes
+//! that remove the resultant and the torque, the smallest one, weighted by how far particles belong to the
+//! surface, is a rigid acceleration w·(α + β × (x − c)). It is a small part of the force, for each body on
+//! its own.
 //!
-//! Two particles belong to one body if the cells of a grid of the support radius that hold them touch. So
+//! Two particles belong to one body if their cells in a grid with the support radius as spacing touch. So
 //! bodies that approach each other count as one slightly too early.
 
 use std::collections::HashMap;
@@ -14,8 +15,8 @@ use glam::{DMat3, DVec3};
 
 use crate::sph::{core::Core, particles::Vectors};
 
-/// A body that is as flat as a line, by the determinant of its moment of inertia over the cube of its trace, has no
-/// axis of its own.
+/// A body that is as flat as a line, by the determinant of its moment of inertia over the cube of its trace,
+/// has no axis of its own.
 const LEAST_ROUND: f64 = 1e-6;
 
 /// A body of fluid.

@@ -1,36 +1,36 @@
-//! What a kernel misses before a free surface.
+//! The part of a kernel that is missing before a free surface.
 //!
 //! A sum over neighbours counts the empty half before a surface as free room: the outermost particles have
-//! four fifths of the density at rest, and may approach each other until they have all of it. Surface tension
-//! pulls just there. It drew the outermost layers together until a drop was a seventh too small, its tension
-//! nearly twice too strong, and its surface too ragged for normals, so that it stirred itself without end.
-//! Water at rest sank by a twentieth in the same way. With the missing part added, a flat surface of a
-//! lattice is as dense as its depth.
+//! four fifths of the rest density, and may approach each other until they reach it. Surface tension pulls
+//! just there. It would draw the outermost layers together until a drop is a seventh too small, its tension
+//! nearly twice too strong, and its surface too ragged for normals, so that the drop never stops stirring
+//! itself. Water at rest would sink by a twentieth in the same way. With the missing part added, a flat
+//! surface of a lattice is as dense as its depth.
 //!
-//! What is missing follows from the normal: n = Σ V ∇W + ∇λ is zero in the depth, and before a flat surface both n and
-//! the missing part depend on the distance from it alone. Between the layers of a lattice the relation is
-//! taken as linear.
+//! The missing part follows from the normal n = Σ V ∇W + ∇λ. In the depth n is zero, and before a flat
+//! surface both n and the missing part depend only on the distance from it. Between the layers of a lattice
+//! the relation is taken as linear.
 
 use crate::sph::kernel::{Surface, Wendland};
 
-/// Normals up to this length, times h, are disorder in the depth.
+/// Normals in the depth reach this length, times h, by disorder alone.
 const DISORDER: f64 = 0.1;
 
 /// Half of the kernel is missing where a particle lies in a flat surface. More is never counted.
 const MOST: f64 = 0.5;
 
-/// Maximum number of layers that are looked at.
+/// Maximum number of layers that are considered.
 const LAYERS: usize = 4;
 
 /// The missing part of a kernel by the length of the normal.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct FreeSurface {
-    /// |n|·h and the missing part, from the depth to the surface. Points that repeat the first one are unused.
+    /// |n|·h and the missing part, from the depth to the surface. Points that repeat the first are unused.
     points: [[f64; 2]; LAYERS + 1],
 }
 
 impl FreeSurface {
-    /// That of a lattice with `ratio` spacings per support radius.
+    /// The relation for a lattice with `ratio` spacings per support radius.
     pub fn of_lattice(ratio: f64) -> Self {
         let mut points = [[DISORDER, 0.0]; LAYERS + 1];
         for layer in 0..LAYERS {
@@ -46,7 +46,7 @@ impl FreeSurface {
     pub fn missing(&self, normal: f64) -> f64 {
         let mut found = 0.0;
         for [from, to] in self.points.array_windows::<2>().copied() {
-            // beyond the last point the last line goes on
+            // beyond the last point the last line continues
             if normal > from[0] && to[0] > from[0] {
                 found = from[1] + (normal - from[0]) * (to[1] - from[1]) / (to[0] - from[0]);
             }
@@ -61,7 +61,7 @@ mod tests {
 
     use super::*;
 
-    /// Sums over the half of a lattice, with what is missing added, are those over the whole.
+    /// A sum over half of a lattice, with the missing part added, equals the sum over the whole lattice.
     #[test]
     fn a_flat_surface_is_as_dense_as_its_depth() {
         for ratio in [2.2, 3.0] {

@@ -1,11 +1,11 @@
-//! The methods that find the pressure. Each has a folder, which declares the method and holds its scheme, a
+//! The methods that find the pressure. Each method has a folder, which declares it and holds its scheme: a
 //! readable `step` over the stages of [`Core`](super::core::Core).
 //!
-//! To add a method: a folder with its numbers, their declaration and limits (`mod.rs`) and its scheme
-//! (`scheme.rs`), and here a `mod` line and a line in the list of methods. `rfm explain --methods` then
-//! writes the page beside it.
+//! To add a method, add a folder with its numbers, their declaration and limits (`mod.rs`) and its scheme
+//! (`scheme.rs`), and in this file a `mod` line and a line in the list of methods. `rfm explain --methods`
+//! then writes the page beside it.
 
-/// The list of all methods, in the order in which they are shown. It is handed to a macro.
+/// Passes the list of all methods, in the order in which they are shown, to a macro.
 macro_rules! for_all_methods {
     ($make:ident) => {
         $make! {
@@ -84,12 +84,14 @@ macro_rules! methods {
                 match self { $(Self::$method(_) => $method::FLUID),* }
             }
 
-            /// The support radius that suits the method's numbers, for a fluid with surface tension or without.
+            /// The support radius that suits the method's numbers, for a fluid with surface tension or
+            /// without.
             pub fn support(&self, has_tension: bool) -> Support {
                 match self { $(Self::$method(numbers) => numbers.support(has_tension)),* }
             }
 
-            /// Settles the numbers that are not stated and depend on whether the fluid of a scene has a free surface.
+            /// Settles the numbers that are not stated and depend on whether the fluid of a scene has a free
+            /// surface.
             pub(crate) fn settle(&mut self, scales: &Scales, has_surface: &dyn Fn() -> bool) {
                 match self { $(Self::$method(numbers) => numbers.settle(scales, has_surface)),* }
             }
@@ -159,7 +161,7 @@ impl Default for Method {
 mod tests {
     use super::*;
 
-    /// A reader that states the default of each key that is a word and is not derived from anything else.
+    /// A reader that states the default of each key whose value is a word that is not derived.
     struct DefaultWords(MethodInfo);
 
     impl KeyReader for DefaultWords {

@@ -1,6 +1,6 @@
 //! What happens to a pressure below zero.
 
-/// What an equation of state returns where the density is below the rest density.
+/// The pressure of an equation of state where the density is below the rest density.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum NegativePressure {
     /// Pressure is cut off at zero: the fluid pushes, and never pulls.

@@ -1,4 +1,4 @@
-//! What the solver needs to know about a method's numbers: limits of the step, walls, pressures.
+//! The questions of the solver to a method's numbers: limits of the step, walls, pressures.
 
 use std::f64::consts::PI;
 
@@ -6,10 +6,10 @@ use crate::sph::error::ParameterError;
 use crate::sph::scales::Scales;
 use crate::sph::walls::{Wall, WallKernel};
 
-/// Part of the support radius that a particle and a sound wave together may cross in one step: the customary
-/// value for weakly compressible fluids, cautious for the paper's. A drop of 3000 particles on the pawn has,
-/// at 0.5 s and 1 s, 1037.8 and 300.6 J with steps of 0.5 ms; 1037.6 and 297.6 J with 2 ms; 1037.0 and 297.2
-/// J with 4 ms; 1034.3 and 290.3 J with 10 ms. The bound at the fastest instant is 3.2 ms.
+/// Part of the support radius that a particle and a sound wave together may cross in one step. The value is
+/// customary for weakly compressible fluids, and cautious for the paper's. A drop of 3000 particles on the
+/// pawn has, at 0.5 s and 1 s, 1037.8 and 300.6 J with steps of 0.5 ms; 1037.6 and 297.6 J with 2 ms; 1037.0
+/// and 297.2 J with 4 ms; 1034.3 and 290.3 J with 10 ms. The bound at the fastest instant is 3.2 ms.
 pub(in crate::sph) const COURANT: f64 = 0.25;
 
 /// Factor of √(h/a) in the limit for an acceleration a: a particle that is accelerated from rest moves 1/32
@@ -21,21 +21,21 @@ const FORCE_FACTOR: f64 = 0.25;
 pub(crate) struct StatedSound {
     /// The speed of sound, m/s.
     pub sound_speed: f64,
-    /// The speed, m/s, to which the greatest pressure that is expected drives the fluid.
+    /// The speed, m/s, to which the greatest expected pressure drives the fluid.
     pub driven_speed: f64,
 }
 
-/// What the solver needs to know of a method's numbers.
+/// The questions of the solver to a method's numbers.
 pub(in crate::sph) trait Numerics: Sync {
-    /// The kinematic viscosity, m²/s, with which the noise of particles is damped, or would be by default: αhc/20 of an
-    /// artificial viscosity. Rows of particles resist a shear about as much without it.
+    /// The kinematic viscosity, m²/s, that damps the noise of particles, or would damp it by default: αhc/20
+    /// of an artificial viscosity. Without it rows of particles resist a shear about as much.
     fn numerical_viscosity(&self, scales: &Scales) -> f64;
 
     /// Whether the drag of a body that moves through the fluid comes out several times too large, as it does
     /// with pressures in pairs.
     fn drag_is_too_large(&self) -> bool;
 
-    /// The speed of sound that a scene states, with the speed that it is measured by; `None` if the scene states
+    /// The speed of sound that a scene states, with the speed to compare it with; `None` if the scene states
     /// none.
     fn stated_sound(&self, _scales: &Scales) -> Option<StatedSound> {
         None
@@ -58,13 +58,15 @@ pub(in crate::sph) trait Numerics: Sync {
         COURANT * scales.support_radius / (self.sound_speed(scales) + max_speed)
     }
 
-    /// The longest step, s, that viscosity allows: (h/2)²/24ν, and half of it where the fluid sticks to walls.
+    /// The longest step, s, that viscosity allows: (h/2)²/24ν, and half of it where the fluid sticks to
+    /// walls.
     ///
-    /// Forces along lines resist a compression three times as strongly as a shear. Away from walls, flows burst with
-    /// steps beyond 1.2 times (h/2)²/24ν (support of 2.4 spacings), or 1.5 times (3 spacings). A wall adds up to
-    /// 2ν·18/h²/(1 − m) to the rate of a particle beside it, and divides what its neighbours add by 1 − m: by a half
-    /// at a wall and by a quarter in an edge, where there are fewer neighbours. Together they allow 0.57 of
-    /// (h/2)²/24ν; flows were found to burst beyond 0.8 of it in a box, and 0.7 in a cylinder.
+    /// Forces along lines resist a compression three times as strongly as a shear. Away from walls, flows
+    /// burst with steps beyond 1.2 times (h/2)²/24ν (support of 2.4 spacings), or 1.5 times (3 spacings). A
+    /// wall adds up to 2ν·18/h²/(1 − m) to the rate of a particle beside it, and divides what its neighbours
+    /// add by 1 − m: by a half at a wall and by a quarter in an edge, where there are fewer neighbours.
+    /// Together they allow 0.57 of (h/2)²/24ν; in tests flows burst beyond 0.8 of it in a box, and 0.7 in a
+    /// cylinder.
     fn viscous_dt(&self, scales: &Scales) -> f64 {
         let part = if scales.sticks { 48.0 } else { 24.0 };
         (0.5 * scales.support_radius).powi(2) * scales.rest_density / (part * scales.viscosity)
@@ -106,8 +108,8 @@ pub(in crate::sph) trait Numerics: Sync {
     }
 
     /// Whether particles that start too near to an obstacle are moved away from it instead of being dropped.
-    /// This suits only methods whose densities at the start do not follow from the places of particles, or that spread
-    /// crowded particles before the first step.
+    /// This suits only methods whose densities at the start do not follow from the places of particles, or
+    /// that spread crowded particles before the first step.
     fn makes_room_at_start(&self) -> bool {
         false
     }
@@ -126,18 +128,18 @@ pub(in crate::sph) trait Numerics: Sync {
         None
     }
 
-    /// Whether it keeps the fluid from being compressed, at any cost.
+    /// Whether the method prevents compression of the fluid at any cost.
     fn keeps_density(&self) -> bool {
         false
     }
 
-    /// Whether, under a force that depends on the place, the velocities after a step are those of its middle.
+    /// Whether the velocities after a step are those of its middle if a force depends on the place.
     fn is_staggered(&self) -> bool {
         false
     }
 
-    /// Whether each step notes what walls do to particles, see `Reaction`. Without that, forces on obstacles
-    /// are those of contacts, and of the pressure in front of their surfaces.
+    /// Whether each step notes the forces of walls on particles, see `Reaction`. Otherwise forces on
+    /// obstacles are those of contacts, and of the pressure in front of their surfaces.
     fn notes_reactions(&self) -> bool {
         false
     }

@@ -17,7 +17,7 @@ pub fn methods_overview() -> String {
     text
 }
 
-/// The [`methods_overview`], followed by a section for each method with all that it declares.
+/// The [`methods_overview`], followed by a section for each method with everything that it declares.
 pub fn methods_reference() -> String {
     let mut text = format!(
         "# Methods of the solver\n\nThis page is what `rfm explain --methods` prints. A key that the method of a scene does \

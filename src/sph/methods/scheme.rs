@@ -4,10 +4,10 @@ use crate::sph::checkpoint::{Checkpoint, CheckpointError};
 use crate::sph::core::Core;
 use crate::sph::error::StepError;
 
-/// The numbers of a method, of which its scheme is made.
+/// The numbers of a method, from which its scheme is made.
 pub(super) trait Start {
-    /// Makes the scheme of a fluid that is new, or that goes on from a state which will be restored, and
-    /// finds densities and forces of the first instant.
+    /// Makes the scheme of a fluid, and finds densities and forces of the first instant. The fluid is new, or
+    /// it continues from a state that will be restored.
     fn start(self, core: &mut Core, is_new: bool) -> Box<dyn Scheme>;
 }
 
@@ -30,7 +30,7 @@ pub(in crate::sph) trait Scheme: Send + Sync {
         Ok(())
     }
 
-    /// The densities that the places of the particles say, kg/m³, for the present positions.
+    /// The densities that follow from the present positions of the particles, kg/m³.
     fn densities<'a>(&'a self, core: &'a Core) -> &'a [f64];
 
     /// Iterations of the last step's solver; `None` for methods without one.

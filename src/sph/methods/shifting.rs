@@ -1,20 +1,20 @@
 //! Shifting, which keeps particles evenly distributed where pressure does not (Lind et al. 2012, Sun et al.
 //! 2017).
 //!
-//! Forces by sums of pressures p_i + p_j push particles apart until they lie evenly, but that makes noise in
-//! proportion to how far the pressure is above zero. Forces by differences p_j − p_i have no such noise, and
-//! no such order. So particles also drift by −2h·U·(Σ V ∇W + ∇λ), where U is the greatest speed: from where
-//! they crowd to where there are few. The drift is not a motion of the fluid. A particle keeps what it
-//! carries (velocity, density); the error of that is of the order of the drift times the gradient.
+//! Forces by sums of pressures p_i + p_j push particles apart until they lie evenly, but the noise of this is
+//! proportional to the pressure. Forces by differences p_j − p_i have no such noise, and make no such order.
+//! So particles also drift by −2h·U·(Σ V ∇W + ∇λ), where U is the greatest speed, from where they crowd to
+//! where there are few. The drift is not a motion of the fluid. A particle keeps what it carries (velocity,
+//! density); the error of that is of the order of the drift times the gradient.
 //!
 //! A compressed fluid has more particles where its pressure is higher, and they do not crowd there. With
-//! `wcsph` the sum is therefore Σ V(1 − (ρ_j − ρ₀)/ρ₀)∇W, with the densities that particles carry. (Without
-//! that the drift and the pressure move particles in a circle, and each round takes momentum from a fluid that
+//! `wcsph` the sum is therefore Σ V(1 − (ρ_j − ρ₀)/ρ₀)∇W, with the densities that particles carry. (Otherwise
+//! the drift and the pressure move particles in a circle, and each round takes momentum from a fluid that
 //! turns.)
 //!
-//! The drift does not change densities that follow the motion, and the fluid's volume would stray: by 5 %
-//! within a few periods of a wave. In the depth of the fluid densities are therefore drawn to what the
-//! particles' places say, Σ m W, at the rate [`RETURN`]·U/h: slowly enough for the noise of that sum to
+//! The drift does not change densities that follow the motion, so the fluid's volume would stray, by 5 %
+//! within a few periods of a wave. In the depth of the fluid densities are therefore drawn to those of the
+//! particles' places, Σ m W, at the rate [`RETURN`]·U/h. This is slow enough for the noise of that sum to
 //! cancel out.
 
 use crate::sph::{
@@ -27,8 +27,8 @@ use crate::sph::{
 /// to the depth.
 const SURFACE: [f64; 2] = [0.85, 0.95];
 
-/// The rate, over U/h, at which densities return to what the particles' places say. A wave's volume strays by
-/// 5 % with 0, 3 % with 0.1, 2 % with 0.3; vortices lose nothing by it.
+/// The rate, over U/h, at which densities return to those of the particles' places. A wave's volume strays by
+/// 5 % with 0, 3 % with 0.1, 2 % with 0.3; vortices lose nothing by the return.
 const RETURN: f64 = 0.3;
 
 /// The rate at which densities return, at the present speeds, 1/s.
@@ -36,7 +36,8 @@ pub(super) fn return_rate(core: &Core) -> f64 {
     RETURN * core.speed / core.parameters.support_radius
 }
 
-/// That rate at the speed of a fall through half a support radius, 1/s: what gravity has loosened, it closes again.
+/// The rate of return at the speed of a fall through half a support radius, 1/s. Gravity closes again what it
+/// has loosened.
 pub(super) fn falling_rate(core: &Core) -> f64 {
     let gravity = core.parameters.gravity.length().max(core.parameters.most_gravity);
     RETURN * (gravity / core.parameters.support_radius).sqrt()

@@ -1,4 +1,4 @@
-//! Which scheme a method has.
+//! The scheme of each method.
 
 use super::Method;
 use super::scheme::{Scheme, Start};
@@ -7,7 +7,7 @@ use crate::sph::core::Core;
 macro_rules! start {
     ($($(#[$about:meta])* $method:ident),* $(,)?) => {
         /// Makes the scheme of the core's method and finds densities and forces of the first instant. If the
-        /// fluid goes on from a checkpoint, those of the checkpoint replace them afterwards.
+        /// fluid continues from a checkpoint, its values replace them afterwards.
         pub(in crate::sph) fn start(core: &mut Core, is_new: bool) -> Box<dyn Scheme> {
             match core.parameters.method {
                 $(Method::$method(numbers) => numbers.start(core, is_new)),*

@@ -7,13 +7,13 @@
 //! a_i = (2σ/ρ₀)·κ_i·n_i
 //! ```
 //!
-//! Only half of ∫|∇c| across the surface lies within the fluid, hence the factor 2: over a closed drop the
-//! pressure jumps by σκ. The sums for κ are one-sided, as the fluid is, so they are divided by their own
-//! tangential moment Σ V c f·½(r² − (r·n̂)²). This is exact where the normals turn evenly (Sirotkin & Yoh
-//! 2012 renormalise the full matrix).
+//! Only half of ∫|∇c| across the surface lies within the fluid, hence the factor 2. With it the pressure of a
+//! closed drop jumps by σκ. The sums for κ are one-sided, like the fluid, so they are divided by their own
+//! tangential moment Σ V c f·½(r² − (r·n̂)²). This is exact where the normals turn evenly. (Sirotkin & Yoh
+//! 2012 renormalise the full matrix.)
 //!
-//! Walls count as fluid: a surface meets a wall at a right angle. The forces on a body of fluid that touches no wall
-//! have neither a resultant nor a torque ([`free_bodies`]).
+//! Walls count as fluid: a surface meets a wall at a right angle. The forces on a body of fluid that touches
+//! no wall have neither a resultant nor a torque ([`free_bodies`]).
 
 use fearless_simd::{Simd, SimdFloat};
 use glam::DVec3;
@@ -27,8 +27,8 @@ use crate::sph::{
     particles::{Vectors, add_scaled},
 };
 
-/// Limits of |n|·h: below the first a particle has no normal, from the second on it has one. A flat surface
-/// has 1.5 where the particle lies in it, and noise in the depth has about 0.05.
+/// Limits of |n|·h. Below the first a particle has no normal; above the second it has a full one. A flat
+/// surface has 1.5 where the particle lies in it, and noise in the depth has about 0.05.
 const NORMAL: [f64; 2] = [0.1, 0.3];
 
 /// A neighbourhood with less than this part of a full tangential moment has no curvature.

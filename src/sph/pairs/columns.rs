@@ -22,8 +22,8 @@ const SLICES: f64 = 8.0;
 /// Upper bound on cells per particle. More cells would cost more to clear than they save.
 const CELLS_PER_PARTICLE: usize = 16;
 
-/// Maximum number of particles that share one gathering of their surroundings. A large block gathers less
-/// often; a small one needs less room around it.
+/// Maximum number of particles whose surroundings are gathered together. A large block gathers less often; a
+/// small one needs less room around it.
 pub(in super::super) const BLOCK: usize = 64;
 
 /// Consecutive particles of one column.
@@ -77,7 +77,7 @@ impl Columns {
 
         self.starts.clear();
         self.starts.resize(self.counts.iter().product::<usize>() + 2, 0);
-        // Counts go two places further on, so that filling `order` leaves the starts in place.
+        // Counts are stored two places further on, so that filling `order` leaves the starts in place.
         for &cell in &self.cell_of {
             self.starts[cell as usize + 2] += 1;
         }

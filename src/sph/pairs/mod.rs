@@ -1,9 +1,10 @@
 //! Sums over neighbours, many particles at a time.
 //!
 //! A register holds several particles that lie close together: consecutive ones of one column. Each particle
-//! near any of them is added in turn to all of them; kernels of finite support give zero to those that are
-//! too far. No list of neighbours exists, so none is kept from step to step. A method that sums many times
-//! over the same places may find once what is around each block and near each register: [`Near`].
+//! near any of them is added in turn to all of them; kernels of finite support give zero where the distance
+//! is too large. There are no lists of neighbours to keep from step to step. A method that sums many times
+//! over the same places may find once which particles are around each block and near each register
+//! ([`Near`]).
 //!
 //! ```text
 //! Columns::sort ─▶ blocks ─▶ gather what is around a block ─▶ registers of particles ─▶ what is near each
@@ -38,8 +39,7 @@ use near::{OfBlock, Range, Reach};
 pub(super) use real::Real;
 
 /// Compiles an expression for three widths of registers (512, 256 and 128 bits on x86-64) and runs the widest
-/// that the processor has. Each width of each pass is code of its own, and the levels in between are not
-/// worth theirs.
+/// that the processor has. Every width adds code for each pass, and the levels in between are not worth it.
 macro_rules! at_level {
     ($level:expr, $simd:ident => $run:expr) => {{
         let level: Level = $level;
@@ -60,13 +60,13 @@ macro_rules! at_level {
 
 /// A precision with working memory of its own.
 pub(super) trait Kept: Real {
-    /// What is around each block, found in this precision.
+    /// The surroundings of each block, found in this precision.
     fn blocks(near: &Near) -> &[OfBlock<Self>];
 
-    /// Where that is to be stored.
+    /// The place to store them.
     fn blocks_mut(near: &mut Near) -> &mut Vec<OfBlock<Self>>;
 
-    /// Lends this thread's working memory, which stays for the next use.
+    /// Lends this thread's working memory, which is kept for the next use.
     fn with_surroundings<R>(use_it: impl FnOnce(&mut Surroundings<Self>) -> R) -> R;
 }
 
@@ -95,7 +95,8 @@ kept!(f64, double);
 /// forms `SUMS` sums and makes `OUT` results from them.
 pub(super) trait PairPass<const IN: usize, const SUMS: usize, const OUT: usize>: Copy + Sync {
     /// Adds the contribution of one neighbour to several particles. `d` points from the neighbour to them,
-    /// and r2 = |d|². Implementations must be `#[inline(always)]` and add zero from the support radius on.
+    /// and r2 = |d|². Implementations must be `#[inline(always)]` and add zero at the support radius and
+    /// beyond.
     fn add<S: Simd, V: SimdFloat<S, Element: Real>>(
         &self,
         d: [V; 3],
@@ -132,7 +133,7 @@ pub(super) struct Cloud<'a> {
 /// Working memory for the sums of a block.
 #[derive(Default)]
 pub(super) struct Surroundings<T> {
-    /// What is around the block, if it was not found before.
+    /// The surroundings of the block, if they were not found before.
     near: OfBlock<T>,
     /// Copies of the fields that a pass reads, in the order of the copies of places.
     fields: Vec<Vec<T>>,
@@ -140,20 +141,20 @@ pub(super) struct Surroundings<T> {
     sums: Vec<f64>,
 }
 
-/// Consecutive blocks for one thread, and where their results go.
+/// Consecutive blocks for one thread, and the place of their results.
 struct Task<'a> {
     /// Number of the first block among all.
     number: usize,
     blocks: &'a [Block],
     /// Index of the first particle.
     first: usize,
-    /// Results of these particles, one slice for each number that a pass makes.
+    /// Results of these particles, one slice for each result of a pass.
     out: SmallVec<[&'a mut [f64]; 8]>,
 }
 
 impl<'a> Task<'a> {
-    /// Halves the blocks among the threads. `one` is behind a pointer so that this is compiled once for all
-    /// passes.
+    /// Halves the blocks repeatedly, to share them among the threads. `one` is behind a pointer so that this
+    /// is compiled once for all passes.
     fn run(self, one: &(dyn Fn(Task<'_>) + Sync)) {
         if self.blocks.len() <= TASK {
             return one(self);
@@ -205,7 +206,7 @@ impl Cloud<'_> {
         });
     }
 
-    /// Finds what is around each block for later passes, which is worthwhile from three passes on.
+    /// Finds the surroundings of each block for later passes. This is worthwhile for three passes or more.
     pub fn find_near<T: Kept>(&self, near: &mut Near) {
         let blocks = self.columns.blocks();
         let near = T::blocks_mut(near);
@@ -295,8 +296,8 @@ fn copy_ranges<T: Kept, S: Simd>(_: S, source: &[f64], origin: f64, ranges: &[Ra
     }
 }
 
-/// Sums over the neighbours of a block's particles. Only this function is compiled for each pass, precision and
-/// width.
+/// Sums over the neighbours of a block's particles. Only this function is compiled for each pass, precision
+/// and width.
 fn add_up<T, P, const IN: usize, const SUMS: usize, const OUT: usize>(
     level: Level,
     pass: &P,

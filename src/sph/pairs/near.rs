@@ -5,9 +5,9 @@ use smallvec::SmallVec;
 
 use super::real::Real;
 
-/// Places within the radius of a register's particles. The ranges of copies are boxes, and about a third of
-/// the copies lies farther than the radius from the box around the particles. Another third is near that box,
-/// but near none of the particles.
+/// Places within the radius of a register's particles. The ranges of copies are boxes. About a third of the
+/// copies lies farther than the radius from the box around the particles. Another third is near that box, but
+/// near none of the particles.
 pub(super) struct Reach<'a, V> {
     here: &'a [V; 3],
     /// A bit for each particle.
@@ -94,7 +94,7 @@ impl<'a, V> Reach<'a, V> {
     }
 }
 
-/// What is around each block, kept for several passes over the same places, in one precision.
+/// The surroundings of each block, kept for several passes over the same places, in one precision.
 #[derive(Default)]
 pub(in crate::sph) struct Near {
     pub(super) single: Vec<OfBlock<f32>>,
@@ -110,12 +110,12 @@ pub(in crate::sph) struct Range {
     pub copy: usize,
 }
 
-/// What is around a block.
+/// The surroundings of a block.
 #[derive(Default)]
 pub(in crate::sph) struct OfBlock<T> {
-    /// Copies of the places around it, relative to it. There is room for one register more.
+    /// Copies of the places around the block, relative to it. There is room for one more register.
     pub places: [Vec<T>; 3],
-    /// The particles that these are copies of.
+    /// The particles of these copies.
     pub ranges: SmallVec<[Range; 9]>,
     /// Number of copies; the vectors may be longer.
     pub count: usize,

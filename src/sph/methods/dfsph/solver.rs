@@ -61,7 +61,7 @@ pub(super) enum Begin {
 pub(super) enum RateOf<'a> {
     /// Velocities of a fluid with this motion as a whole, beside walls that may move.
     Velocity(&'a Rigid),
-    /// Accelerations or displacements by pressure, which walls do not share.
+    /// Accelerations or displacements by pressure, to which the motion of walls adds nothing.
     Pressure,
 }
 

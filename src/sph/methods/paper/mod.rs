@@ -108,12 +108,12 @@ impl Declaration for Paper {
 }
 
 impl Numerics for Paper {
-    /// None: the viscosity of this method is the fluid's own.
+    /// Zero, because the viscosity of this method is the fluid's own.
     fn numerical_viscosity(&self, _scales: &Scales) -> f64 {
         0.0
     }
 
-    /// Its fluid is as viscous as the paper's, and that causes more drag than the method does.
+    /// False: its fluid is as viscous as the paper's, which causes more drag than the method does.
     fn drag_is_too_large(&self) -> bool {
         false
     }
@@ -123,9 +123,9 @@ impl Numerics for Paper {
         self.stiffness.sqrt()
     }
 
-    /// One decay time of the relative velocity of two lone, coinciding particles, half of what an explicit
-    /// step tolerates. It decays at the rate 2·viscosity·m·∇²W(0)/ρ² with ρ = mW(0), the fastest that the
-    /// method can produce, because denser surroundings divide by a larger ρ.
+    /// One decay time of the relative velocity of two lone, coinciding particles: half of the longest stable
+    /// explicit step. The velocity decays at the rate 2·viscosity·m·∇²W(0)/ρ² with ρ = mW(0), the fastest
+    /// that the method can produce, because denser surroundings divide by a larger ρ.
     fn viscous_dt(&self, scales: &Scales) -> f64 {
         let (h, mass) = (scales.support_radius, scales.particle_mass);
         let lone_density = mass * 315.0 / (64.0 * PI * h.powi(3));

@@ -7,7 +7,7 @@
 //!
 //! The paper gives force densities f_i; here a_i = f_i/ρ_i, with m_j/ρ_j as the volume of a neighbour in
 //! every sum. The paper prints m_j/ρ_i in (11) and (14). With m_j/ρ_j each pair of particles exchanges m·a =
-//! ∓ m²/(ρ_i ρ_j)·(…), the same number with opposite signs: momentum is conserved to rounding. With the
+//! ∓ m²/(ρ_i ρ_j)·(…), the same number with opposite signs, so momentum is conserved to rounding. With the
 //! printed factor the lighter of two particles would push less than it is pushed. Surface tension is not a
 //! pair force, and conserves momentum only as far as the surface is closed.
 //!
@@ -126,7 +126,7 @@ impl PaperScheme {
     }
 }
 
-/// The force terms that a fluid has. A term that it lacks is not compiled into its loop.
+/// The force terms of a fluid. A term that it lacks is not compiled into its loop.
 #[derive(Debug, Clone, Copy)]
 struct Terms {
     pressure: bool,
