@@ -29,7 +29,7 @@ const EDGE_FAR: Rgb = [186, 186, 186];
 const EDGE_THICKNESS: f64 = 2.8;
 /// The floor's nearness is reduced by this factor, so that it gives way to anything that lies on it.
 const FLOOR_BEHIND: f64 = 1.0 - 1e-4;
-/// The materials of which a sheet is made, each of its own.
+/// The materials that get sheets, one sheet for each.
 const CLEAR: [Material; 2] = [Material::Glass, Material::ClearWater];
 
 /// The camera, the box, the obstacles that stand still and the legend, ready for frames.
@@ -37,13 +37,14 @@ const CLEAR: [Material; 2] = [Material::Glass, Material::ClearWater];
 pub struct Backdrop {
     camera: Camera,
     scale: Scale<'static>,
-    /// The floor and the opaque meshes. The edges of the box are drawn last, over particles too, because their soft
-    /// borders need the colour behind them.
+    /// The floor and the opaque meshes. The edges of the box are drawn last, over particles too, because
+    /// their soft borders need the colour behind them.
     canvas: Canvas,
     /// The clear meshes in each band, by their material.
     glass: Vec<[Option<Sheet>; 2]>,
     edges: Vec<Edge>,
-    /// All of it as pixels, without light and shadow, and the nearness of the foremost sub-pixel of each.
+    /// The whole backdrop as pixels, without light and shadow, and the nearness of the foremost sub-pixel of
+    /// each.
     pixels: Vec<u8>,
     nearness: Vec<f32>,
     floor: Option<Floor>,
@@ -51,12 +52,12 @@ pub struct Backdrop {
     title: Layer,
     bar: Option<Layer>,
     spare: Spare,
-    /// The number of triangles of the meshes that are not drawn because a corner is not finite, lies behind the
-    /// eye, or does not exist.
+    /// The number of triangles of the meshes that are not drawn because a corner is not finite, lies behind
+    /// the eye, or does not exist.
     pub skipped_triangles: usize,
 }
 
-/// What changes from frame to frame.
+/// The contents of a picture that change from frame to frame.
 #[derive(Debug, Clone, Copy)]
 pub struct Moving<'a> {
     /// Obstacles that move, and the surface of the fluid.
@@ -67,7 +68,7 @@ pub struct Moving<'a> {
     pub balls: bool,
 }
 
-/// What is drawn over a canvas.
+/// Things that are drawn over a canvas.
 #[derive(Default)]
 struct Actors<'a> {
     meshes: Vec<Facets>,
@@ -75,7 +76,7 @@ struct Actors<'a> {
 }
 
 impl Backdrop {
-    /// Draws what does not move: the box with the corners of `bounds` in metres, and the meshes.
+    /// Draws the fixed parts: the box with the corners of `bounds` in metres, and the meshes.
     ///
     /// # Errors
     /// [`RenderError::Legend`], which is a bug of ours.
@@ -130,14 +131,14 @@ impl Backdrop {
         Ok(backdrop)
     }
 
-    /// The backdrop with colours of particles that its legend need not show.
+    /// The backdrop with other colours of particles, which its legend need not show.
     #[must_use]
     pub fn coloured(mut self, scale: &Scale<'_>) -> Self {
         self.scale = scale.unlabelled();
         self
     }
 
-    /// The picture with particles in it, and the caption of its moment.
+    /// The picture with particles, and the caption of its moment.
     ///
     /// Particles whose position is not finite or lies behind the eye are left out and counted in
     /// [`Image::skipped`]. Those whose value is NaN are grey.
@@ -145,8 +146,8 @@ impl Backdrop {
         self.frame_with(&Moving { meshes: &[], particles: *particles, balls: true }, moment)
     }
 
-    /// The picture with all that moves in it, and the caption of its moment. Particles are treated as by
-    /// [`Backdrop::frame`]; triangles that cannot be drawn are left out.
+    /// The picture with everything that moves, and the caption of its moment. Particles are treated as in
+    /// [`Backdrop::frame`]. Triangles that cannot be drawn are left out.
     pub fn frame_with(&self, moving: &Moving<'_>, moment: &Caption) -> Image {
         self.spare.lend(|workspace| self.frame_in(moving, moment, workspace))
     }
@@ -189,7 +190,7 @@ impl Backdrop {
         })
     }
 
-    /// Draws over the canvas, and writes the pixels that may change by it, or all.
+    /// Draws over the canvas, and writes the pixels that this may change, or all pixels.
     fn draw(&self, actors: &Actors<'_>, all: bool, pixels: &mut [u8], nearness: &mut [f32]) {
         let width = self.canvas.width;
         let (stride, height) = (width / SUBPIXELS, self.canvas.nearness.len() / width);
@@ -259,7 +260,7 @@ impl Backdrop {
     }
 }
 
-/// The pixels for a unit of the layout, which is made for a height of 960.
+/// Pixels per unit of the layout, which is made for a height of 960.
 fn unit(camera: &Camera) -> f64 {
     f64::from(camera.height) / 960.0
 }
@@ -415,8 +416,8 @@ mod tests {
             let [r, _, b] = centre(&frame(&scene, &[DVec3::X * x], &[1.0]), &scene);
             i32::from(r) - i32::from(b)
         };
-        // how red a ball is: before a plate as without one, behind glass less, behind water still less,
-        // behind stone not
+        // a ball is as red before a plate as without one, less red behind glass, still less behind water, and
+        // not red behind stone
         let bare = centre(
             &frame(&scene(MeshView::default()), &[DVec3::X * 0.5], &[1.0]),
             &scene(MeshView::default()),

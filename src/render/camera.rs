@@ -29,7 +29,7 @@ pub struct Camera {
     up: DVec3,
     /// The direction from the scene to the eye.
     back: DVec3,
-    /// The sub-pixels for a unit length at depth one.
+    /// Sub-pixels per unit length at depth one.
     focal: f64,
     /// The point where the axis of the view meets the screen.
     centre: DVec2,
@@ -71,7 +71,7 @@ impl Camera {
             return Err(RenderError::Size(width, height));
         }
         let back = towards_eye.try_normalize().unwrap_or(DVec3::new(0.48, -1.0, 0.46).normalize());
-        // seen straight from above or below, y points up in the picture
+        // in a view straight from above or below, y points up in the picture
         let right = DVec3::Z.cross(back).try_normalize().unwrap_or(DVec3::X);
         let up = back.cross(right);
         let eye = bounds.centre() + DISTANCE * diagonal * back;
@@ -91,7 +91,8 @@ impl Camera {
         self.centre = corner + 0.5 * room - 0.5 * self.focal * (low + high);
     }
 
-    /// The view with a point in the middle of what margins leave, and everything `zoom` times as large.
+    /// The view with a point in the middle of the area within the margins, and everything `zoom` times as
+    /// large.
     #[must_use]
     pub fn aimed(mut self, at: DVec3, zoom: f64) -> Self {
         self.focal *= zoom;
@@ -156,7 +157,7 @@ impl Camera {
         self.eye - p
     }
 
-    /// The sub-pixels for a unit length at a nearness.
+    /// Sub-pixels per unit length at a nearness.
     pub(super) fn magnification(&self, nearness: f64) -> f64 {
         self.focal * nearness
     }

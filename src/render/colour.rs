@@ -1,8 +1,8 @@
 //! Maps from values to colours. The first is blue for low, yellow for medium, red for high values.
 //!
 //! Every map is linear in the value, so pictures of different runs can be compared if their ranges are equal.
-//! People with red–green blindness can read them: none but viridis and cividis has a green, and these two
-//! also grow lighter all along.
+//! People with red–green blindness can read them: only viridis and cividis have a green, and these two also
+//! become steadily lighter.
 
 /// An sRGB colour with 8 bits per channel: red, green, blue.
 pub type Rgb = [u8; 3];
@@ -10,7 +10,7 @@ pub type Rgb = [u8; 3];
 /// The colour of a particle whose value is NaN.
 pub const UNKNOWN: Rgb = [128, 128, 128];
 
-/// A map from values to colours, the same as that of this name in the viewer.
+/// A map from values to colours, equal to the map of this name in the viewer.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum ColourMap {
     /// Dark blue, light blue, yellow, orange, red.
@@ -18,7 +18,7 @@ pub enum ColourMap {
     BlueYellowRed,
     /// From dark violet to yellow, evenly in lightness.
     Viridis,
-    /// From dark blue to yellow, evenly in lightness; alike for people with any vision of colours.
+    /// From dark blue to yellow, evenly in lightness; it looks alike to people with any colour vision.
     Cividis,
     /// Blue below the middle and red above it, for values around a reference.
     BlueWhiteRed,
@@ -79,8 +79,8 @@ impl ColourMap {
     }
 
     /// The colour of a value on the map over the range `low` … `high`, all in the same unit. Values beyond
-    /// the range have the colours of its ends, all values that of the low end if the range is empty, and NaN
-    /// is a grey of its own.
+    /// the range have the colours of its ends. If the range is empty, all values have the colour of the low
+    /// end. NaN has a separate grey.
     pub fn colour(self, value: f64, (low, high): (f64, f64)) -> Rgb {
         if value.is_nan() {
             return UNKNOWN;
@@ -88,7 +88,7 @@ impl ColourMap {
         let t = if high > low { ((value - low) / (high - low)).clamp(0.0, 1.0) } else { 0.0 };
         let stops = self.stops();
         let last = (stops.len() - 1) as f64;
-        // ∞/∞ is the greatest
+        // ∞/∞ counts as the greatest
         let position = if t.is_nan() { last } else { last * t };
         let k = (position as usize).min(stops.len() - 2);
         let part = position - k as f64;

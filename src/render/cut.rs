@@ -2,7 +2,7 @@
 
 use glam::DVec3;
 
-/// A plane that cuts a mesh open: what lies on the side of its normal is not drawn.
+/// A plane that cuts a mesh open: the part on the side of its normal is not drawn.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Cut {
     /// The unit normal of the plane, towards the side that is cut away.

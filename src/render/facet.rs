@@ -11,12 +11,12 @@ pub(super) struct Facet {
     pub vertices: [u32; 3],
     /// The normals in the camera's frame, towards the side that is seen.
     pub normals: [[f32; 3]; 3],
-    /// How far the corners lie beyond the cut, times their nearness: this changes evenly over the screen.
+    /// How far the corners lie beyond the cut, times their nearness. The product is linear on the screen.
     pub beyond: [f32; 3],
 }
 
 impl Facet {
-    /// The colour that the corners give to the place that has these weights of them; `None` if corners have none.
+    /// The colour at the place with these weights of the corners; `None` if the corners have no colours.
     pub fn tint(&self, weights: [f32; 3], tints: &[[f32; 3]]) -> Option<[f32; 3]> {
         if tints.is_empty() {
             return None;
@@ -25,7 +25,7 @@ impl Facet {
         Some(std::array::from_fn(|i| (0..3).map(|k| weights[k] * corners[k][i]).sum()))
     }
 
-    /// The unit normal at the place that has these weights of the corners.
+    /// The unit normal at the place with these weights of the corners.
     pub fn normal(&self, [u, v, w]: [f32; 3]) -> [f32; 3] {
         let [a, b, c] = self.normals;
         let n: [f32; 3] = std::array::from_fn(|i| u * a[i] + v * b[i] + w * c[i]);
@@ -33,7 +33,7 @@ impl Facet {
         n.map(|x| x / length)
     }
 
-    /// Whether the place that has these weights of the corners is cut away.
+    /// Whether the place with these weights of the corners is cut away.
     pub fn is_beyond(&self, weights: [f32; 3]) -> bool {
         shade::dot(weights, self.beyond) > 0.0
     }

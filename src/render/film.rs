@@ -1,4 +1,4 @@
-//! Pictures that move: what changes from one to the next, and animated PNG.
+//! Films: the part that changes from one picture to the next, and animated PNG.
 
 use std::io::{self, Write};
 
@@ -13,8 +13,8 @@ pub(super) struct Part {
     pub height: usize,
 }
 
-/// The least rectangle in which two pictures of the same size differ; one pixel if they are equal. A pixel has `bytes`
-/// bytes.
+/// The smallest rectangle in which two pictures of the same size differ; one pixel if they are equal. A pixel
+/// has `bytes` bytes.
 pub(super) fn changed<T: PartialEq>(before: &[T], now: &[T], width: usize, bytes: usize) -> Part {
     let row = width * bytes;
     let rows = || before.chunks_exact(row).zip(now.chunks_exact(row)).enumerate();
@@ -30,7 +30,7 @@ pub(super) fn changed<T: PartialEq>(before: &[T], now: &[T], width: usize, bytes
     Part { left, top, width: right + 1 - left, height: bottom + 1 - top }
 }
 
-/// An animated PNG: all colours, and a still picture for programs that know no animation.
+/// An animated PNG. It has all colours, and programs without animation show a still picture.
 pub struct Apng<W: Write> {
     writer: png::Writer<W>,
     size: (u32, u32),
@@ -122,7 +122,7 @@ pub(super) mod tests {
     #[test]
     fn an_animated_png_decodes_to_the_same_pictures() {
         let mut images = film(5, (40, 30));
-        // one that is like the one before it
+        // a picture equal to the one before it
         images.insert(2, images[1].clone());
         let mut bytes = Vec::new();
         let mut film = Apng::new(&mut bytes, (40, 30), 6, 25).unwrap();

@@ -1,8 +1,8 @@
-//! The shadow on the bottom of the box, so that what lies on it is seen to lie there and what flies is seen to fly.
+//! The shadow on the bottom of the box, which shows whether a thing lies there or flies.
 //!
-//! The light comes from straight above, and from a wide part of the sky: the shadow of a low thing is dark
-//! and has a sharp border, that of a high thing is pale and wide. A map keeps the lowest thing over each of
-//! its cells.
+//! The light comes from straight above, and from a wide part of the sky. The shadow of a low thing is dark
+//! with a sharp border; the shadow of a high thing is pale and wide. A map keeps the height of the lowest
+//! thing over each of its cells.
 //!
 //! Invariant: the lowest of several heights does not depend on their order.
 
@@ -14,14 +14,15 @@ use crate::geom::Aabb;
 
 /// Cells of the map along the longer side of the floor.
 const CELLS: f64 = 192.0;
-/// Height above which a thing casts no shadow, over the diagonal of the box; how dark the shadow of one on
-/// the floor is; and how far it is blurred, over the diagonal of the box.
+/// Two kinds of shadow, each with three numbers: the height above which a thing casts none, over the diagonal
+/// of the box; its darkness for a thing on the floor; and the reach of its blur, over the diagonal of the
+/// box.
 const SHADOWS: [(f64, f32, f64); 2] = [(0.03, 0.30, 0.006), (0.45, 0.24, 0.03)];
-/// By how much nearness may differ from that of the floor, as a part of it. The floor is drawn by twice this
-/// behind itself.
+/// Largest difference from the floor's nearness that counts as the floor, as a part of it. The floor is drawn
+/// behind its place by twice this.
 const SLACK: f64 = 0.5e-4;
 
-/// The floor, and how low things are over it.
+/// The floor, and the heights of the things over it.
 #[derive(Debug, Clone)]
 pub(super) struct Floor {
     low: DVec2,
@@ -38,7 +39,7 @@ pub(super) struct Floor {
 }
 
 impl Floor {
-    /// The empty floor of a box. `None` if it is not seen from above.
+    /// The empty floor of a box; `None` if it is not seen from above.
     pub fn new(bounds: &Aabb, camera: &Camera) -> Option<Self> {
         let plane = Cut { normal: DVec3::Z, offset: bounds.min.z };
         let nearness = camera.nearness_of(&plane).filter(|_| camera.is_beyond(&plane))?;
@@ -82,7 +83,7 @@ impl Floor {
         }
     }
 
-    /// Adds the undersides of a mesh. Light goes through clear ones, and what is cut away is not there.
+    /// Adds the undersides of a mesh. Clear meshes cast no shadow, and neither do parts that are cut away.
     pub fn add_mesh(&mut self, mesh: &MeshView<'_>) {
         if mesh.material.is_clear() {
             return;
@@ -138,7 +139,7 @@ impl Floor {
             let mut shadow: Vec<f32> =
                 self.heights.iter().map(|height| (1.0 - height / highest).max(0.0)).collect();
             let cells = (blur * self.diagonal / self.cell).round() as usize;
-            // twice, so that borders have no corners
+            // twice, for smoother borders
             for _ in 0..2 {
                 shadow = self.blurred(&shadow, cells);
             }
@@ -163,11 +164,13 @@ impl Floor {
         found
     }
 
-    /// Darkens the pixels of a picture that show the floor. `nearness` is that of the nearest sub-pixel of each.
+    /// Darkens the pixels of a picture that show the floor. `nearness` is that of the nearest sub-pixel of
+    /// each pixel.
     pub fn shade(&self, camera: &Camera, nearness: &[f32], light: &mut [f32], width: usize) {
         let map = self.light();
         let [a, b, c] = self.nearness;
-        // a pixel has the greatest nearness of its four sub-pixels, whose middles are half a sub-pixel from its own
+        // a pixel has the greatest nearness of its four sub-pixels, whose middles are half a sub-pixel from
+        // its own
         let nearest = 0.5 * (b.abs() + c.abs());
         light.par_chunks_mut(width).zip(nearness.par_chunks(width)).enumerate().for_each(
             |(row, (light, near))| {
@@ -197,7 +200,8 @@ impl Floor {
     }
 }
 
-/// Hands on the mean of each value and those at most `reach` places from it, beyond the ends of which there are zeros.
+/// Passes to `take` the mean of each value and its neighbours up to `reach` places away. Beyond the ends the
+/// values count as zero.
 fn means(values: impl Iterator<Item = f32> + Clone, reach: usize, mut take: impl FnMut(usize, f32)) {
     let count = (2 * reach + 1) as f64;
     let (mut ahead, mut behind) = (values.clone(), values.clone());

@@ -1,7 +1,8 @@
-//! Pictures that move as GIF, with one palette for all of them, so that colours do not flicker.
+//! Films as GIF, with one palette for all pictures, so that colours do not flicker.
 //!
-//! Invariant: the palette is found from given pictures, and a pixel's index from the palette alone; so the bytes do not
-//! depend on the number of threads, and a pixel that stays has the same index in all pictures.
+//! Invariant: the palette depends on the given pictures alone, and a pixel's index on its colour and the
+//! palette. So the bytes do not depend on the number of threads, and a pixel that stays has the same index in
+//! all pictures.
 
 use std::borrow::Cow;
 use std::io::{self, Write};
@@ -11,11 +12,11 @@ use rayon::prelude::*;
 use super::film::{Part, changed};
 use super::{Image, Rgb};
 
-/// Colours of the palette; the index after them means that a pixel stays as it was.
+/// Number of colours of the palette. The index after them means that a pixel keeps its colour.
 const COLOURS: usize = 255;
 const STAYS: u8 = 255;
 
-/// The first bits of each channel that choose the index of a pixel.
+/// Number of leading bits of each channel that choose the index of a pixel.
 const BITS: usize = 6;
 
 /// The colours of a film.
@@ -28,9 +29,9 @@ pub struct Palette {
 impl Palette {
     /// The colours that suit some pictures of a film. White is always exact.
     ///
-    /// Colours are parted where they differ most until there are as many parts as a palette holds. A colour
-    /// is weighted with the root of its number of pixels, so that a few fast particles among much paper have
-    /// their own.
+    /// Groups of colours are divided where they differ most until there are as many groups as a palette
+    /// holds. A colour is weighted with the root of its number of pixels, so that a few fast particles on
+    /// much paper have their own colours.
     pub fn of(pictures: &[&Image]) -> Self {
         let mut cells = vec![([0_u64; 3], 0_u64); 1 << (3 * BITS)];
         for pixel in pictures.iter().flat_map(|picture| picture.pixels.chunks_exact(3)) {
@@ -66,7 +67,7 @@ struct Shade {
     weight: f64,
 }
 
-/// Colours that share one of the palette.
+/// Colours that share one colour of the palette.
 struct Group {
     shades: Vec<Shade>,
     /// The channel in which they differ most, their mean in it, and the weighted sum of the squares of their
@@ -106,13 +107,13 @@ impl Group {
     }
 }
 
-/// The number of the colours that share their first bits with a pixel.
+/// The number of the cell of colours that share their first bits with a pixel.
 fn cell(pixel: &[u8]) -> usize {
     let bits = |channel: u8| usize::from(channel >> (8 - BITS));
     bits(pixel[0]) << (2 * BITS) | bits(pixel[1]) << BITS | bits(pixel[2])
 }
 
-/// The colour in the middle of those that share their first bits; black and white are exact.
+/// The colour in the middle of a cell; black and white are exact.
 fn middle(cell: usize) -> Rgb {
     [2 * BITS, BITS, 0].map(|shift| {
         let bits = cell >> shift & ((1 << BITS) - 1);
@@ -143,7 +144,8 @@ pub struct Gif<W: Write> {
 }
 
 impl<W: Write> Gif<W> {
-    /// Begins a film. `size` is the width and the height in pixels, `rate` the number of pictures in a second.
+    /// Begins a film. `size` is the width and the height in pixels, `rate` the number of pictures in a
+    /// second.
     ///
     /// # Errors
     /// Those of `out`, and of a size beyond 65535.
@@ -157,7 +159,7 @@ impl<W: Write> Gif<W> {
         Ok(Self { encoder, palette, size, rate: rate.max(1), count: 0, before: None })
     }
 
-    /// Adds pictures in their order. What does not change from one to the next is not stored again.
+    /// Adds pictures in their order. Only the part that changes from one to the next is stored.
     ///
     /// # Errors
     /// Those of the stream, and of a picture of another size.
@@ -206,7 +208,7 @@ fn part_of(before: Option<&Vec<u8>>, now: &[u8], (width, height): (u16, u16)) ->
     }
 }
 
-/// How long a picture is shown, in hundredths of a second: whole numbers whose sum keeps the rate.
+/// The duration of a picture, in hundredths of a second: a whole number, such that the sum keeps the rate.
 fn delay(picture: u32, rate: u32) -> u16 {
     let until = |pictures: u32| (f64::from(pictures) * 100.0 / f64::from(rate)).round();
     (until(picture + 1) - until(picture)) as u16
@@ -217,7 +219,7 @@ mod tests {
     use super::super::film::tests::film;
     use super::*;
 
-    /// The pictures of a GIF, and how long each is shown.
+    /// The pictures of a GIF with their durations.
     fn decoded(bytes: &[u8], (width, height): (usize, usize)) -> Vec<(Vec<u8>, u16)> {
         let mut options = gif::DecodeOptions::new();
         options.set_color_output(gif::ColorOutput::RGBA);

@@ -1,17 +1,19 @@
 //! Clear things: obstacles of glass and the surface of the fluid, blended over what is seen through them.
 //!
-//! A pixel keeps the nearest and the farthest of the clear triangles that its ray meets: the front and the back of a
-//! thing. What lies between them, such as the inner sides of a thick wall, would darken the picture and show nothing.
+//! A pixel keeps the nearest and the farthest of the clear triangles that its ray meets: the front and the
+//! back of a thing. Triangles between them, such as the inner sides of a thick wall, would only darken the
+//! picture.
 //!
-//! Invariant: sheets are blended from far to near, and equal ones in their order, so the order of triangles
-//! does not matter.
+//! Invariant: sheets are blended from far to near, and equally near ones in their order, so the order of
+//! triangles does not matter.
 
 use super::{
     raster::{Band, Corner, Frame},
     shade::Veil,
 };
 
-/// The foremost and the hindmost clear triangle at each sub-pixel of a part of a band. Nearness 0 stands for none.
+/// The foremost and the hindmost clear triangle at each sub-pixel of a part of a band. Nearness 0 means that
+/// there is none.
 #[derive(Debug, Clone)]
 pub(super) struct Sheet {
     pub frame: Frame,
@@ -25,7 +27,8 @@ impl Sheet {
         Self { frame, front: none.clone(), back: none }
     }
 
-    /// Adds a triangle. `veil` takes the weights of the corners, and gives `None` where the triangle is cut away.
+    /// Adds a triangle. `veil` takes the weights of the corners, and gives `None` where the triangle is cut
+    /// away.
     pub fn hang(&mut self, corners: &[Corner; 3], veil: impl Fn([f32; 3]) -> Option<Veil>) {
         let (front, back) = (&mut self.front, &mut self.back);
         self.frame.fragments(corners, |at, near, weights| {
@@ -40,7 +43,8 @@ impl Sheet {
         });
     }
 
-    /// The veils at a sub-pixel that lie before a nearness: the back, and then the front if it is another one.
+    /// The veils at a sub-pixel in front of a nearness: the back, and then the front if it is another
+    /// triangle.
     fn before(&self, x: usize, y: usize, nearness: f32) -> impl Iterator<Item = (f32, Veil)> {
         let (columns, rows) = (self.frame.columns(), self.frame.rows());
         let is_here = columns.contains(&x) && rows.contains(&y);
@@ -53,7 +57,8 @@ impl Sheet {
     }
 }
 
-/// The most veils at a sub-pixel: two for each of the sheets of still and of moving things of glass and of water.
+/// Maximum number of veils at a sub-pixel: two for each of the sheets of still and of moving things of glass
+/// and of water.
 const MOST: usize = 8;
 
 /// Blends sheets over a band.

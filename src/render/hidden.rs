@@ -1,4 +1,4 @@
-//! How much of a fluid an obstacle hides.
+//! The part of a fluid that an obstacle hides.
 
 use glam::DVec3;
 
@@ -36,7 +36,7 @@ mod tests {
         (vertices, sides.iter().flat_map(|[a, b, c, d]| [[*a, *b, *c], [*a, *c, *d]]).collect())
     }
 
-    /// What is seen of a box around the origin, from +x, at the middle of the picture.
+    /// The middle of the picture of a box around the origin, seen from +x.
     fn seen(cut: Option<Cut>) -> (Rgb, f64) {
         let bounds = Aabb::new(DVec3::splat(-1.0), DVec3::ONE);
         let camera = Camera::new(&bounds, DVec3::X, (320, 240)).unwrap();
@@ -62,7 +62,7 @@ mod tests {
         let open = seen(plane(DVec3::X, 0.1));
         assert_eq!(open.0, shade::section(Material::Stone, [0.0, 0.0, 1.0]));
         assert!((open.1 - at(0.1)).abs() < 1e-6, "{} {}", open.1, at(0.1));
-        // a cut behind the solid takes all of it, one in front of it nothing
+        // a cut behind the solid removes all of it, a cut in front of it nothing
         assert_eq!(seen(plane(DVec3::X, -0.7)), ([255; 3], 0.0));
         assert_eq!(seen(plane(DVec3::X, 0.7)), stone);
         // the far half is gone: its face looks away

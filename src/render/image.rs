@@ -27,7 +27,7 @@ impl Image {
         self.pixels.get(at..at + 3)?.try_into().ok()
     }
 
-    /// Writes the picture as PNG, compressed for speed and not for size.
+    /// Writes the picture as PNG, compressed for speed, not for size.
     ///
     /// # Errors
     /// Those of `out`.

@@ -24,9 +24,9 @@ pub struct MeshView<'a> {
     /// Values that choose the colours, one for each vertex, in the unit of the [`Scale`]. If there are fewer,
     /// the mesh has the colour of its material.
     pub values: &'a [f64],
-    /// The plane that cuts the mesh open, which must then be closed. Clear meshes are cut without a face.
+    /// The plane that cuts the mesh open, which must then be closed. In clear meshes the cut has no face.
     pub cut: Option<Cut>,
-    /// What the mesh is made of.
+    /// The material of the mesh.
     pub material: Material,
 }
 
@@ -35,7 +35,7 @@ pub struct MeshView<'a> {
 pub struct Facets {
     facets: Vec<Facet>,
     by_band: Vec<Part>,
-    /// The colours of the vertices; empty if they have that of the material.
+    /// The colours of the vertices; empty if they have the colour of the material.
     tints: Vec<[f32; 3]>,
     pub material: Material,
     cut: Option<SeenCut>,
@@ -96,7 +96,8 @@ impl Facets {
         here.iter().map(|&k| &self.facets[k as usize])
     }
 
-    /// The columns of sub-pixels between which the facets in the band that begins at a row lie; empty without any.
+    /// The columns of sub-pixels between which the facets of the band that begins at a row lie; an empty
+    /// range without facets.
     pub fn columns(&self, top: usize) -> (i64, i64) {
         self.by_band.get(top / BAND_ROWS).unwrap_or(&Part::NONE).columns
     }
@@ -125,7 +126,7 @@ impl Facets {
         }
     }
 
-    /// The colour of a facet at the place that has these weights of its corners.
+    /// The colour of a facet at the place with these weights of its corners.
     fn colour(&self, facet: &Facet, weights: [f32; 3]) -> Rgb {
         shade::solid(self.material, facet.tint(weights, &self.tints), facet.normal(weights))
     }

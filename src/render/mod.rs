@@ -1,16 +1,17 @@
-//! Pictures of a simulation: the box, the obstacle's mesh and the particles, coloured by their speed or another value.
+//! Pictures of a simulation: the box, the obstacle's mesh and the particles, which are coloured by their
+//! speed or another value.
 //!
 //! ```text
 //! Camera, box, mesh ──Backdrop::new──▶ Backdrop ──frame(particles)──▶ Image ──write_png──▶ PNG
 //!                                                                       └──Apng, Gif──▶ a film
 //! ```
 //!
-//! Clear things are blended over opaque ones (`glass`). Then folds are darkened by the depth of the picture
-//! (`occlusion`), and the floor by the things over it (`floor`).
+//! Clear things are blended over opaque ones (`glass`). Then folds are darkened, as found from the depth of
+//! the picture (`occlusion`), and the floor is shadowed by the things over it (`floor`).
 //!
 //! Everything is drawn on the processor at twice the size and averaged down. Rows are cut into bands of fixed
-//! height, which are drawn in parallel. Within a band the order is fixed, so ties in depth are settled alike
-//! every time.
+//! height, which are drawn in parallel. Within a band the order is fixed, so ties in depth are always settled
+//! in the same way.
 //!
 //! Invariant: a band depends on its inputs alone, so a picture has the same bits on any number of threads.
 //! This module takes plain slices, opens no file and reads no clock.
@@ -54,7 +55,7 @@ pub use self::{
 };
 use crate::geom::Aabb;
 
-/// Why a backdrop could not be drawn, or a picture not be written.
+/// The reason why a backdrop could not be drawn, or a picture could not be written.
 #[derive(Debug)]
 pub enum RenderError {
     /// The box to look at is empty, infinite or a point.

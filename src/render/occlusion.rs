@@ -1,27 +1,29 @@
-//! Soft darkness in folds, corners and under things, found from the depth of the picture alone.
+//! Soft darkness in folds and corners and under things, found from the depth of the picture alone.
 //!
-//! A ball around each point of the picture is filled in part by what lies in front of that point. Loos and
-//! Sloan ("Volumetric Obscurance", 2010) measure that part along some lines through the ball, in the
-//! direction of the view, and take the lines in pairs on opposite sides of the point. Nearness is linear over
-//! the picture on every plane, so both lines of a pair together are half full on a plane, however it is
-//! turned: planes stay as bright as they are.
+//! A ball around each point of the picture is partly filled by the things in front of that point. Loos and
+//! Sloan ("Volumetric Obscurance", 2010) measure this part along some lines through the ball, in the
+//! direction of the view, and take the lines in pairs on opposite sides of the point. On every plane nearness
+//! is linear over the picture, so both lines of a pair together are half full, however the plane is turned.
+//! Planes therefore keep their brightness.
 //!
-//! Invariant: the same lines are taken at every pixel and nothing is random, so pictures have the same bits every time.
+//! Invariant: every pixel uses the same lines and nothing is random, so pictures have the same bits every
+//! time.
 
 use rayon::prelude::*;
 
 /// The radius of the balls over the diagonal of the box.
 const RADIUS: f64 = 0.035;
-/// How much darker a point is of whose ball a quarter is filled, which is one at the bottom of a right angle.
+/// Darkening of a point with a quarter of its ball filled, such as one at the bottom of a right angle.
 const DARKEST: f32 = 0.45;
 /// The pairs of lines through a ball.
 const LINES: u8 = 10;
-/// The part of a turn between a pair and the next, so that directions are spread evenly for any number of pairs.
+/// The part of a turn between a pair and the next, so that directions are spread evenly for any number of
+/// pairs.
 const GOLDEN: f64 = 0.618_033_988_75;
-/// Pixels that are looked at together.
+/// Number of pixels that are computed together.
 const RUN: usize = 64;
 
-/// The balls as the picture shows them.
+/// The balls, in the scale of the picture.
 #[derive(Debug, Clone)]
 pub(super) struct Balls {
     lines: Vec<Line>,
@@ -35,25 +37,27 @@ struct Line {
     /// The place of one of them in the picture, from the point.
     columns: isize,
     rows: isize,
-    /// Half the length of a line within the ball, times two, over the square of nearness: a difference of
-    /// nearness over this and over the square of nearness is the part of the line by which it changes.
+    /// Half the length of a line within the ball, times two, over the square of nearness. A difference of
+    /// nearness, divided by this and by the square of nearness, is the part of the line by which it changes.
     length: f32,
     weight: f32,
 }
 
 impl Balls {
-    /// `diagonal` is that of the box in metres, and `pixels` are those for a metre in the middle of the box.
+    /// `diagonal` is that of the box in metres, and `pixels` is the number of pixels per metre in the middle
+    /// of the box.
     pub fn new(diagonal: f64, pixels: f64) -> Self {
         let radius = RADIUS * diagonal;
         let line = |k: u8| {
-            // every line stands for an equal part of the disc, and each has its own distance, so that no rings show
+            // every line stands for an equal part of the disc, and all distances differ, so that no rings
+            // appear
             let part = ((f64::from(k) + 0.5) / f64::from(LINES)).sqrt();
             let (sin, cos) = libm::sincos(std::f64::consts::PI * (GOLDEN * f64::from(k)).fract());
             let at = |x: f64| (part * radius * pixels * x).round() as isize;
             let half = (1.0 - part * part).sqrt();
             Line { columns: at(cos), rows: at(sin), length: (radius * half) as f32, weight: half as f32 }
         };
-        // in small pictures lines may fall on the point itself, and say nothing there
+        // in small pictures lines may fall on the point itself, where they measure nothing
         let lines: Vec<Line> =
             (0..LINES).map(line).filter(|line| (line.columns, line.rows) != (0, 0)).collect();
         let reach = lines.iter().map(|line| line.columns.unsigned_abs().max(line.rows.unsigned_abs()));
@@ -61,7 +65,7 @@ impl Balls {
     }
 
     /// Finds how bright the pixels of a picture are, 0 … 1. Nearness 0 is the paper, which stays bright.
-    /// `padded` is memory for it.
+    /// `padded` is working memory.
     pub fn light(&self, nearness: &[f32], width: usize, padded: &mut Vec<f32>, light: &mut Vec<f32>) {
         light.clear();
         light.resize(nearness.len(), 1.0);
@@ -84,7 +88,8 @@ impl Balls {
         });
     }
 
-    /// How full the balls of a run of pixels are beyond one half, times two, summed over the lines with their weights.
+    /// Twice the part of the balls of a run of pixels that is filled beyond one half, summed over the lines
+    /// with their weights.
     fn filled(&self, padded: &Padded<'_>, (x, y): (usize, usize)) -> [f32; RUN] {
         let points = padded.run(x, y, 0, 0);
         // paper has no depth, and is left out afterwards
@@ -97,7 +102,7 @@ impl Balls {
             for i in 0..RUN {
                 let a = (one[i] - points[i]) * (scale[i] * inverse);
                 let b = (other[i] - points[i]) * (scale[i] * inverse);
-                // what is far in front of the ball is not in it, and says nothing about what is behind
+                // a thing far in front of the ball is not in it, and hides what lies behind
                 let far = a.max(b);
                 let within = (2.0 - 0.5 * far).clamp(0.0, 1.0);
                 let both = 0.5 * (a.clamp(-1.0, 1.0) + b.clamp(-1.0, 1.0));
@@ -108,7 +113,7 @@ impl Balls {
     }
 }
 
-/// The nearness of a picture with paper around it.
+/// The nearness of a picture, with a border of paper.
 struct Padded<'a> {
     nearness: &'a [f32],
     width: usize,
@@ -116,7 +121,7 @@ struct Padded<'a> {
 }
 
 impl<'a> Padded<'a> {
-    /// Puts it into `padded`.
+    /// Writes the nearness with its border to `padded`.
     fn new(nearness: &[f32], width: usize, border: usize, padded: &'a mut Vec<f32>) -> Self {
         let wide = width + RUN + 2 * border;
         let rows = nearness.len() / width;
@@ -129,8 +134,8 @@ impl<'a> Padded<'a> {
         Self { nearness: padded, width: wide, border }
     }
 
-    /// The pixels of a row from x on, moved by the given numbers of columns and rows, which are at most the
-    /// border.
+    /// The run of pixels that begins at (x, y), moved by the given numbers of columns and rows, which are at
+    /// most the border.
     fn run(&self, x: usize, y: usize, columns: isize, rows: isize) -> &[f32; RUN] {
         let row = (y + self.border).wrapping_add_signed(rows);
         let start = row * self.width + (x + self.border).wrapping_add_signed(columns);
@@ -143,7 +148,7 @@ mod tests {
     use super::*;
 
     const WIDTH: usize = 120;
-    /// Pixels for a metre, and the distance of what is looked at, in metres.
+    /// Pixels per metre, and the distance of the surface, in metres.
     const PIXELS: f64 = 400.0;
     const FAR: f64 = 50.0;
 
@@ -204,10 +209,10 @@ mod tests {
     fn what_is_far_in_front_casts_no_darkness() {
         let radius = RADIUS * 2.0;
         let over = |gap: f64| light(move |x, _| Some(if x > 0.0 { gap * radius } else { 0.0 }));
-        // beside a step there is darkness, beside something a metre in front of it none
+        // a point beside a step is darkened, but not a point beside something a metre in front of it
         assert!(dark(&over(0.7), -0.006, 0.0) > 0.1);
         assert!(dark(&over(15.0), -0.006, 0.0) < 0.01);
-        // and the near side has none at all
+        // and the near side is not darkened at all
         assert!(dark(&over(0.7), 0.006, 0.0) < 0.01);
     }
 }

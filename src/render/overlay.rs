@@ -16,16 +16,17 @@ pub struct Legend<'a> {
     pub scale: Option<Scale<'a>>,
 }
 
-/// What the colours of particles mean. Frames of a run can be compared if it is the same for all of them.
+/// The meaning of the colours of particles. Frames of a run can be compared if they share one scale.
 #[derive(Debug, Clone, Copy)]
 pub struct Scale<'a> {
-    /// What is shown, with its unit, over the colour bar.
+    /// The quantity and its unit, written over the colour bar.
     pub label: &'a str,
     /// The value at the low end of the map.
     pub low: f64,
     /// The value at the high end of the map.
     pub high: f64,
-    /// Whether smaller and larger values may be shown, in the colours of the ends. The bar then ends in a tip.
+    /// Whether smaller and larger values may be shown, in the colours of the ends. The bar then ends in a
+    /// tip.
     pub open: [bool; 2],
     /// The colours.
     pub map: ColourMap,
@@ -38,7 +39,7 @@ impl<'a> Scale<'a> {
         Self { label: "speed, m/s", low: 0.0, high: fastest, open, map: ColourMap::default() }
     }
 
-    /// The scale without its label, which then need not live as long as the text.
+    /// The scale without its label, so that it need not live as long as the text.
     pub(super) fn unlabelled(&self) -> Scale<'static> {
         Scale { label: "", ..*self }
     }
@@ -83,7 +84,7 @@ pub fn title(text: &str, width: f64, scale: f64) -> Result<Layer, RenderError> {
     draw((width, 48.0), scale, &format!(r#"<text x="32" y="36" font-size="22">{text}</text>"#))
 }
 
-/// A text as SVG holds it.
+/// A text, escaped for SVG.
 fn escaped(text: &str) -> String {
     let mut escaped = String::new();
     for c in text.chars().filter(|c| !c.is_control()) {
@@ -100,7 +101,7 @@ fn escaped(text: &str) -> String {
 pub const BAR_WIDTH: f64 = 124.0;
 /// The height of the colour bar's layer, in units.
 pub const BAR_HEIGHT: f64 = 420.0;
-/// The length of the tip in which the colour bar ends where values beyond it are shown, in units.
+/// The length, in units, of the tip at an end of the colour bar beyond which values are shown.
 const TIP: f64 = 12.0;
 
 /// The colour bar.
@@ -179,7 +180,7 @@ fn grouped(number: u64) -> String {
 /// Two to seven round values of a range with their labels. Empty if the range is empty or endless.
 fn round_values(low: f64, high: f64) -> Vec<(f64, String)> {
     let width = high - low;
-    // between numbers that agree in all but their last digits there are no others to show
+    // numbers that agree in all but their last digits have no round values between them
     let noise = 1e-9 * low.abs().max(high.abs());
     if !(width > noise && width.is_finite()) {
         return Vec::new();
@@ -187,7 +188,7 @@ fn round_values(low: f64, high: f64) -> Vec<(f64, String)> {
     let decade = libm::log10(width).floor() as i32;
     let candidates = [(1, decade - 1), (2, decade - 1), (5, decade - 1), (1, decade), (2, decade)];
     for (mantissa, exponent) in candidates {
-        // read back from digits, so that the value is the one of the label
+        // read back from digits, so that the value equals the label
         let number = |k: i64| format!("{}e{exponent}", k * mantissa).parse::<f64>().unwrap_or(f64::NAN);
         let step = number(1);
         let first = ((low - 1e-9 * width) / step).ceil() as i64;

@@ -28,12 +28,12 @@ pub struct Disc {
     y: f32,
     radius: f32,
     nearness: f32,
-    /// The nearness of the front of the ball, less that of its middle.
+    /// The nearness of the front of the ball, minus that of its middle.
     bulge: f32,
     colour: [f32; 3],
 }
 
-/// The least radius in sub-pixels. Smaller discs could fall between the middles of sub-pixels and flicker.
+/// The smallest radius in sub-pixels. Smaller discs could fall between the middles of sub-pixels and flicker.
 const MIN_RADIUS: f32 = 0.9;
 
 /// Finds the discs of all particles, in their order; `None` for those that the camera does not see.
@@ -65,7 +65,7 @@ pub(super) fn columns(discs: &[Disc]) -> (i64, i64) {
     })
 }
 
-/// Draws discs, near ones first. Most of a crowd is hidden by the ones in front, and is passed over.
+/// Draws discs, near ones first. In a crowd most discs are hidden by those in front, and are skipped.
 pub(super) fn draw(discs: &[Disc], band: &mut Band<'_>) {
     let mut hidden = Hidden { left: band.left, farthest: vec![0.0; band.width.div_ceil(TILE)] };
     let mut next = FIRST_LOOK;
@@ -80,13 +80,13 @@ pub(super) fn draw(discs: &[Disc], band: &mut Band<'_>) {
     }
 }
 
-/// Columns of a band that are looked at together.
+/// Number of columns of a band that form a tile.
 const TILE: usize = 16;
-/// Discs that are drawn before the first look at what hides others.
+/// Number of discs that are drawn before the first update of the limits that hide others.
 const FIRST_LOOK: usize = 128;
 
-/// The limits that hide discs in a band: the least nearness in each of its tiles when they were last looked
-/// at. Nearness only grows.
+/// The limits that hide discs in a band: the least nearness in each of its tiles at the last update. They
+/// stay valid, because nearness only grows.
 struct Hidden {
     left: usize,
     farthest: Vec<f32>,
@@ -103,7 +103,7 @@ impl Hidden {
         }
     }
 
-    /// Whether no part of a disc is in front of what was seen. Discs beside the band are drawn nowhere.
+    /// Whether a disc lies behind the limits everywhere. Discs beside the band are not drawn.
     fn hides(&self, disc: &Disc) -> bool {
         let reach = disc.reach() + 1.0;
         // `as` rounds down and saturates
@@ -114,15 +114,15 @@ impl Hidden {
     }
 }
 
-/// Puts into `found` the discs that may reach each band, near ones first: most of the others are then hidden
-/// and need no shading. Equally near ones keep their order. `order` is memory for it.
+/// Puts into `found` the discs that may reach each band, near ones first, because most of the others are then
+/// hidden and need no shading. Equally near ones keep their order. `order` is working memory.
 pub(super) fn by_band(
     discs: &[Option<Disc>],
     bands: usize,
     order: &mut Vec<u64>,
     found: &mut Vec<Vec<Disc>>,
 ) {
-    // nearness is positive, so its bits have its order; the index makes every key another one
+    // nearness is positive, so its bits sort as it does; the index makes every key unique
     let key = |(i, disc): (usize, &Option<Disc>)| {
         disc.as_ref().map(|disc| u64::from(!disc.nearness.to_bits()) << 32 | i as u64)
     };

@@ -1,7 +1,7 @@
 //! Sub-pixels with depth: the canvas, its bands, triangles and lines.
 //!
-//! Invariant: what is nearer hides what is farther, and among equals the first that was drawn stays.
-//! Triangles are cut from the plane in integers, so neighbours share an edge without gap or overlap.
+//! Invariant: nearer things hide farther ones, and among equally near ones the first that was drawn stays.
+//! Triangles are rasterised in integers, so neighbours share an edge without gap or overlap.
 
 use std::ops::Range;
 
@@ -51,7 +51,7 @@ impl Canvas {
     }
 }
 
-/// A part of a canvas. It is used again, because the system clears new memory page by page.
+/// A part of a canvas. Its memory is reused, because the system clears new memory page by page.
 #[derive(Default)]
 pub struct Scratch {
     pub nearness: Vec<f32>,
@@ -72,12 +72,12 @@ impl Band<'_> {
         self.top + self.nearness.len() / self.width
     }
 
-    /// The part of lo..=hi that lies in the band, for columns.
+    /// The columns of lo..=hi that lie in the band.
     pub fn columns(&self, lo: f64, hi: f64) -> Range<usize> {
         clip(lo, hi, self.left, self.left + self.width)
     }
 
-    /// The part of lo..=hi that lies in the band, for rows.
+    /// The rows of lo..=hi that lie in the band.
     pub fn rows(&self, lo: f64, hi: f64) -> Range<usize> {
         clip(lo, hi, self.top, self.bottom())
     }
@@ -124,7 +124,7 @@ impl Band<'_> {
         let reach = 0.5 * thickness + 0.5;
         for y in self.rows(a.y.min(b.y) - reach, a.y.max(b.y) + reach) {
             let centre = y as f64 + 0.5;
-            // where the line passes this row; a nearly level line passes it everywhere between its ends
+            // where the line passes this row; a nearly level line passes it along its whole length
             let slack = reach * (1.0 + length / along.y.abs().max(1e-9));
             let at_row = a.x + (centre - a.y) / if along.y == 0.0 { 1e-9 } else { along.y } * along.x;
             let lo = (at_row - slack).max(a.x.min(b.x) - reach);
@@ -157,7 +157,7 @@ impl Band<'_> {
         });
     }
 
-    /// Where the band lies.
+    /// The place of the band in the picture.
     pub fn frame(&self) -> Frame {
         Frame { left: self.left, top: self.top, width: self.width, bottom: self.bottom() }
     }
@@ -193,8 +193,8 @@ impl Frame {
         self.top..self.bottom
     }
 
-    /// Gives every sub-pixel of a triangle to `fragment`: the index at which the band stores it, its nearness, and the
-    /// weights of the corners, whose sum is one.
+    /// Gives every sub-pixel of a triangle to `fragment`: the index at which the band stores it, its
+    /// nearness, and the weights of the corners, whose sum is one.
     pub fn fragments(self, corners: &[Corner; 3], mut fragment: impl FnMut(usize, f32, [f32; 3])) {
         let [a, b, mut c] = *corners;
         let mut b = b;
@@ -249,7 +249,7 @@ pub struct Corner {
 
 impl Corner {
     pub fn new(seen: Seen) -> Self {
-        // the camera shows nothing beyond a million sub-pixels, so products below stay within 62 bits
+        // the camera shows nothing beyond a million sub-pixels, so the products below stay within 62 bits
         let snap = |v: f64| (v * STEPS as f64).round() as i64;
         Self { x: snap(seen.at.x), y: snap(seen.at.y), nearness: seen.nearness as f32 }
     }
@@ -294,15 +294,15 @@ fn is_top_or_left(a: Corner, b: Corner) -> bool {
 /// The sub-pixels of first..end whose middles lie between the least and the greatest of three coordinates.
 fn covered(v: [i64; 3], first: usize, end: usize) -> Range<usize> {
     let (low, high) = (v[0].min(v[1]).min(v[2]), v[0].max(v[1]).max(v[2]));
-    // shifts divide and round down, and floats are rounded by a function call on old processors
+    // shifts divide and round down; floats would be rounded by a function call on old processors
     let to = ((high - STEPS / 2) >> STEP_BITS) + 1;
     let from = (low + STEPS / 2 - 1) >> STEP_BITS;
     let to = (to.max(0) as usize).clamp(first, end);
     (from.max(0) as usize).clamp(first, to)..to
 }
 
-/// The whole numbers of lo..=hi within first..end, and sometimes the one beyond hi. The result is always a range inside
-/// that, and may be empty.
+/// The whole numbers of lo..=hi within first..end, and sometimes the one beyond hi. The result always lies
+/// within first..end, and may be empty.
 fn clip(lo: f64, hi: f64, first: usize, end: usize) -> Range<usize> {
     // `as` rounds down, saturates, and turns NaN into 0
     let end = if hi >= 0.0 { (hi as usize).saturating_add(2).clamp(first, end) } else { first };

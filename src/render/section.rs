@@ -1,10 +1,11 @@
-//! Obstacles that are cut open, so that the fluid behind them is seen.
+//! Obstacles that are cut open to show the fluid behind them.
 //!
-//! A ray from the eye that has entered a closed mesh more often than it has left it, before it meets the
-//! plane of the cut, comes out of the inside there: it shows the face that the cut has opened. So no triangle
+//! A ray from the eye may have entered a closed mesh more often than it has left it before it meets the plane
+//! of the cut. Then it is inside the mesh there, and shows the face that the cut has opened. So no triangle
 //! is divided, and the face is as sharp as the picture.
 //!
-//! Invariant: neighbouring triangles share an edge without gap or overlap, so the count is exact for closed meshes.
+//! Invariant: neighbouring triangles share an edge without gap or overlap, so the count is exact for closed
+//! meshes.
 
 use super::{
     Cut, Rgb,
@@ -33,7 +34,8 @@ impl SeenCut {
     pub fn draw(&self, facets: &[&Facet], ink: impl Fn(&Facet, [f32; 3]) -> Rgb, band: &mut Band<'_>) {
         let mut left = vec![0.0_f32; band.nearness.len()];
         let mut colour = vec![[0; 3]; band.nearness.len()];
-        // how often the ray has entered the part that is cut away, less how often it has left it
+        // number of times that the ray has entered the part that is cut away, minus the number of times that
+        // it has left it
         let mut inside = vec![0_i16; band.nearness.len()];
         let frame = band.frame();
         for facet in facets {

@@ -4,7 +4,7 @@
 
 use super::Rgb;
 
-/// What a mesh is made of.
+/// The material of a mesh.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Material {
     /// A warm grey that hides what is behind it: obstacles.
@@ -12,14 +12,14 @@ pub enum Material {
     Stone,
     /// An obstacle through which the fluid is seen.
     Glass,
-    /// The surface of a fluid that hides what is in it.
+    /// The surface of a fluid that hides the things in it.
     Water,
     /// The surface of a fluid through which obstacles and particles are seen.
     ClearWater,
 }
 
 impl Material {
-    /// Whether what is behind is seen.
+    /// Whether things behind it are seen.
     pub(super) fn is_clear(self) -> bool {
         match self {
             Self::Stone | Self::Water => false,
@@ -51,7 +51,7 @@ const WATER_SECTION: [f32; 3] = [142.0, 183.0, 217.0];
 /// The colour of water.
 const WATER: [f32; 3] = [72.0, 138.0, 196.0];
 
-/// The colour of a point of a surface that hides what is behind it. A tint stands for the colour of the material.
+/// The colour of a point of an opaque surface. A tint replaces the colour of the material.
 pub fn solid(material: Material, tint: Option<[f32; 3]>, normal: [f32; 3]) -> Rgb {
     match material {
         Material::Stone | Material::Glass => stone(tint.unwrap_or(STONE), normal),
@@ -59,8 +59,8 @@ pub fn solid(material: Material, tint: Option<[f32; 3]>, normal: [f32; 3]) -> Rg
     }
 }
 
-/// The colour and the opacity of a point of a clear surface. Clear things hide more of what is behind them
-/// where they are seen at a flat angle: their outline shows, and their middle does not.
+/// The colour and the opacity of a point of a clear surface. Clear things hide more where they are seen at a
+/// flat angle, so their outline shows and their middle does not.
 pub fn veil(material: Material, tint: Option<[f32; 3]>, normal: [f32; 3]) -> Veil {
     let flat = 1.0 - normal[2].clamp(0.0, 1.0);
     let (least, rim) = match material {
@@ -100,7 +100,8 @@ pub fn section(material: Material, normal: [f32; 3]) -> Rgb {
     colour.map(|channel| byte(channel * light))
 }
 
-/// The colour of a point of a particle. The rim is darker, so that neighbours of one colour stay apart.
+/// The colour of a point of a particle. The rim is darker, so that neighbours of one colour can be
+/// distinguished.
 pub fn ball(colour: [f32; 3], normal: [f32; 3]) -> Rgb {
     let rim = (0.45 + 1.1 * normal[2]).min(1.0);
     let light = (0.56 + 0.52 * dot(normal, LAMP).max(0.0)) * rim;
