@@ -1,8 +1,8 @@
 //! Cranelift instructions on a 128-bit vector of lanes, one function at a time.
 //!
-//! Traps that shape this file: `fmin`/`fmax` cost seven instructions, a comparison with `bitselect` is
-//! recognised as the single `min`/`max` instruction; a scalar float `select` becomes a jump, so single points
-//! use vectors too; `fma` is never emitted, because results must not depend on the processor.
+//! Traps that shape this file: `fmin`/`fmax` cost seven instructions, but a comparison with `bitselect` is
+//! recognised as the single `min`/`max` instruction. A scalar float `select` becomes a jump, so single points
+//! use vectors, too. `fma` is never emitted, because results must not depend on the processor.
 
 use std::collections::{HashMap, HashSet};
 use std::sync::Arc;
@@ -21,25 +21,25 @@ use crate::table::Table;
 pub(super) struct Emitter<'a, 'f> {
     pub builder: &'a mut FunctionBuilder<'f>,
     pub precision: Precision,
-    /// Lanes that hold a point. Functions of the library are called for no others: a single point would pay
-    /// for the origin as well. Those of `sine` take a whole vector.
+    /// Lanes that hold a point. Functions of the library are called for these lanes only; otherwise a single
+    /// point would pay for the origin as well. Functions of `sine` take a whole vector.
     lanes: u8,
     pub forms: &'a Forms,
     pub hosts: &'a Hosts,
     /// Intermediate results of R₀ for a pair of operands: value and weights share them.
     pub parts: HashMap<(Node, Node, Junction), R0Parts>,
-    /// Pairs whose weights will be asked for: their value uses the same quotient.
+    /// Pairs whose weights will be needed. Their value uses the same quotient.
     pub weighted: HashSet<(Node, Node, Junction)>,
-    /// Sines and cosines of arguments that had one: the other is found with it.
+    /// Sines and cosines that were found together for one argument.
     pub waves: HashMap<Node, Waves>,
 }
 
-/// What a program calls.
+/// The functions that a program calls.
 #[derive(Default)]
 pub(super) struct Hosts {
     /// The functions of the mathematical library.
     pub functions: HashMap<HostFunction, FuncRef>,
-    /// Those of `sine`: which results of a node are needed, and what finds them.
+    /// The functions of `sine`: the results of a node that are needed, and the function that finds them.
     pub waves: HashMap<Node, (Wanted, FuncRef)>,
 }
 
@@ -53,10 +53,10 @@ pub(super) enum Junction {
     Or,
 }
 
-/// What value and weights of u ∧ v or u ∨ v share.
+/// Intermediate results that value and weights of u ∧ v or u ∨ v share.
 #[derive(Clone, Copy)]
 pub(super) struct R0Parts {
-    /// The operand that the result is near to on the small branch: the minimum for ∧, the maximum for ∨.
+    /// The operand close to the result on the small branch: the minimum for ∧, the maximum for ∨.
     pub near: Value,
     /// The other one.
     pub far: Value,
@@ -68,7 +68,7 @@ pub(super) struct R0Parts {
     pub small: Value,
     /// max(|u|, |v|) + h
     pub denominator: Value,
-    /// Masks u < v and v < u: at a tie neither, and both operands get the same weight.
+    /// Masks u < v and v < u. At a tie neither is set, and both operands get the same weight.
     pub less: Value,
     pub greater: Value,
     /// |τ| with the sign of m/M on the branch taken; only where weights are asked for.
@@ -135,14 +135,14 @@ impl<'a, 'f> Emitter<'a, 'f> {
         self.builder.ins().bitselect(mask, yes, no)
     }
 
-    /// b < a ? a : b, one instruction; the pattern is not recognised with the comparison turned round.
+    /// b < a ? a : b, one instruction. The pattern is not recognised if the comparison is reversed.
     pub fn max(&mut self, a: Value, b: Value) -> Value {
         let less = self.compare(FloatCC::LessThan, b, a);
         self.select(less, a, b)
     }
 
-    /// A vector whose lanes have only their sign bit set. A constant, which is loaded once before a loop:
-    /// `fneg` and `fabs` would build it again at every use.
+    /// A vector whose lanes have only their sign bit set. It is a constant, loaded once before a loop; `fneg`
+    /// and `fabs` would build it again at every use.
     fn sign_bits(&mut self) -> Value {
         self.constant(-0.0)
     }
@@ -177,13 +177,14 @@ impl<'a, 'f> Emitter<'a, 'f> {
         found.expect("every use is declared")
     }
 
-    /// What the first lane holds, in all lanes: lanes without a point may hold what takes a function's slow path.
+    /// The number of the first lane in all lanes, because lanes without a point may hold numbers that take a
+    /// function's slow path.
     fn in_all_lanes(&mut self, x: Value) -> Value {
         let (first, vector) = (self.builder.ins().extractlane(x, 0), self.vector_type());
         self.builder.ins().splat(vector, first)
     }
 
-    /// A host function, lane by lane.
+    /// Calls a host function, lane by lane.
     ///
     /// # Panics
     /// If it was not declared: a bug of the caller.
@@ -191,7 +192,7 @@ impl<'a, 'f> Emitter<'a, 'f> {
         self.call_behind(function, &[], operands)
     }
 
-    /// What a table has, lane by lane. The program then has the address of the table in it.
+    /// Looks up a table, lane by lane. The program then contains the address of the table.
     ///
     /// # Panics
     /// If its function was not declared: a bug of the caller.
@@ -201,8 +202,8 @@ impl<'a, 'f> Emitter<'a, 'f> {
         self.call_behind(HostFunction::Table(lookup.part), &[address], &at)
     }
 
-    /// A host function, lane by lane, with arguments that all lanes share before the others. Lanes without a
-    /// point are zero.
+    /// Calls a host function, lane by lane. Arguments that all lanes share come before the others. Lanes
+    /// without a point are zero.
     fn call_behind(&mut self, function: HostFunction, shared: &[Value], operands: &[Value]) -> Value {
         let function = self.hosts.functions[&function];
         let vector = self.vector_type();
@@ -223,5 +224,5 @@ impl<'a, 'f> Emitter<'a, 'f> {
     }
 }
 
-/// Only the byte order of a bitcast between lanes of one width, where it does not matter.
+/// The byte order of bitcasts between lanes of one width, where it does not matter.
 pub(super) const ENDIANNESS: cranelift_codegen::ir::Endianness = cranelift_codegen::ir::Endianness::Little;

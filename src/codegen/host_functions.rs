@@ -1,6 +1,6 @@
-//! Functions that have no machine instruction: called lane by lane, the same functions that the interpreter
-//! uses. Tables of a graph are looked up by such functions too; they receive the address of the table. Sines
-//! and cosines are called only for the arguments that `sine` leaves to them.
+//! Functions that have no machine instruction. They are the functions of the interpreter, called lane by
+//! lane. Such functions also look up tables of a graph; they receive the address of the table. Sines and
+//! cosines are called only for the arguments that `sine` does not handle.
 
 use std::sync::Arc;
 
@@ -11,12 +11,12 @@ use crate::ir::{Binary, BinaryFunction, Expr, Lookup, Part, Unary, UnaryFunction
 use crate::precision::Precision;
 use crate::table::Table;
 
-/// Whose functions of the mathematical library a program calls.
+/// The mathematical library whose functions a program calls.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Library {
-    /// Those of the interpreter.
+    /// The functions of the interpreter.
     Rfm,
-    /// Those of the C library that an object file is linked with.
+    /// The functions of the C library that an object file is linked with.
     System,
 }
 
@@ -25,12 +25,13 @@ pub enum Library {
 pub(super) enum HostFunction {
     Unary(UnaryFunction),
     Binary(BinaryFunction),
-    /// What a table has at a point. Its first argument is the address of the table.
+    /// The value of a table at a point. The first argument is the address of the table.
     Table(Part),
 }
 
 impl HostFunction {
-    /// All of them, to be registered with the linker: names are never looked up in the host's C library.
+    /// All functions, to be registered with the linker, so that names are never looked up in the host's C
+    /// library.
     pub fn all() -> impl Iterator<Item = Self> {
         let of_two = BinaryFunction::ALL.iter().copied().map(Self::Binary);
         let tables = Lookup::PARTS.into_iter().map(Self::Table);
@@ -119,8 +120,8 @@ macro_rules! lookups {
                 /// `table` points to a table.
                 // SAFETY: see the one use of the pointer
                 pub unsafe extern "C" fn $name(table: *const Arc<dyn Table>, x: $t, y: $t, z: $t) -> $t {
-                    // SAFETY: programs hand over an address that `Emitter::lookup` wrote into them: that of a table
-                    // of their graph, which the `Code` that is running keeps alive and in its place.
+                    // SAFETY: programs pass the address that `Emitter::lookup` wrote into them. It belongs to
+                    // a table of their graph, which the running `Code` keeps alive and in its place.
                     let table = unsafe { &**table };
                     $part.of(table, [f64::from(x), f64::from(y), f64::from(z)]) as $t
                 }

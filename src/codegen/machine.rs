@@ -1,4 +1,4 @@
-//! The machine that code is generated for, and why there may be none.
+//! The machine for which code is generated, and the errors if it has no code generator.
 
 use std::fmt;
 use std::sync::{Arc, OnceLock};
@@ -6,12 +6,12 @@ use std::sync::{Arc, OnceLock};
 use cranelift_codegen::isa::{self, OwnedTargetIsa};
 use cranelift_codegen::settings::{self, Configurable};
 
-/// Why there is no program.
+/// The reason why a program could not be compiled.
 #[derive(Debug, Clone)]
 pub enum CodegenError {
     /// This processor or system cannot run compiled code; the interpreter can.
     Unsupported(String),
-    /// The code generator refused what it was given: always a bug of ours.
+    /// The code generator refused its input, which is always a bug of ours.
     Bug(String),
 }
 
@@ -34,7 +34,7 @@ fn allocator(nodes: usize) -> &'static str {
     if nodes > SINGLE_PASS_ABOVE { "single_pass" } else { "backtracking" }
 }
 
-/// The instruction set of this machine, found out once per register allocator.
+/// The instruction set of this machine, detected once per register allocator.
 pub(super) fn target(nodes: usize) -> Result<OwnedTargetIsa, CodegenError> {
     static THOROUGH: OnceLock<Result<OwnedTargetIsa, CodegenError>> = OnceLock::new();
     static FAST: OnceLock<Result<OwnedTargetIsa, CodegenError>> = OnceLock::new();
@@ -43,12 +43,12 @@ pub(super) fn target(nodes: usize) -> Result<OwnedTargetIsa, CodegenError> {
     cell.get_or_init(|| detect(allocator, Place::Memory)).as_ref().map(Arc::clone).map_err(Clone::clone)
 }
 
-/// Where code is put.
+/// The place of the code.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Place {
     /// The memory of this process.
     Memory,
-    /// An object file, which a linker may put anywhere.
+    /// An object file, whose code a linker may place anywhere.
     Object,
 }
 

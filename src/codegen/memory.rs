@@ -12,17 +12,17 @@ use crate::precision::Precision;
 /// Machine code of one program, freed when this is dropped.
 pub struct Code {
     entry: *const u8,
-    /// The type that it computes in.
+    /// The type of its numbers.
     pub precision: Precision,
-    /// How it is called.
+    /// The shape of its calls.
     pub shape: Shape,
-    /// How many numbers it writes for a point.
+    /// Number of results that it writes for a point.
     pub outputs: usize,
     /// Bytes of machine code.
     pub size: usize,
-    /// Owns the pages; taken out only to be freed.
+    /// Owns the pages; it is taken out only to free them.
     module: Mutex<Option<JITModule>>,
-    /// The code has their addresses in it.
+    /// The tables whose addresses the code contains.
     _tables: Tables,
 }
 

@@ -1,12 +1,12 @@
 //! Graph → machine code, through Cranelift: into executable memory, or into an object file.
 //!
 //! A *program* is one function: its outputs (ω; or ω and ∇ω) at one point, or at many points in blocks of one
-//! 128-bit vector (two `f64` or four `f32`), the widest that the code generator has. The same translation
-//! serves both: a single point is a vector whose other lanes are zero.
+//! 128-bit vector (two `f64` or four `f32`), the widest that the code generator has. One translation serves
+//! both, because a single point is a vector whose other lanes are zero.
 //!
-//! Invariants: code memory is owned by the `Code` that refers to it and freed with it, never writable and
-//! executable at once; the operations are those of `ir`, in its order, so results agree with the interpreter
-//! bit for bit. Unsafe code of the crate lives here and in `solid::programs::compiled` only.
+//! Invariants: code memory is owned by the `Code` that refers to it and freed with it, and is never writable
+//! and executable at once. The operations are those of `ir`, in its order, so results agree with the
+//! interpreter bit for bit. Unsafe code of the crate lives here and in `solid::programs::compiled` only.
 
 mod emitter;
 mod host_functions;

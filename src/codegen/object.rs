@@ -11,20 +11,20 @@ use super::request::Request;
 use super::sine;
 use super::translate::{Named, define, needed, waves};
 
-/// A program of an object file, under the name that a linker knows it by.
+/// A program of an object file, under the name for the linker.
 pub struct ObjectProgram<'a> {
     /// Name of the symbol.
     pub symbol: String,
-    /// What is compiled.
+    /// The program to compile.
     pub request: Request<'a>,
 }
 
-/// Compiles programs into an object file, for this machine or for another one of the same kind of processor, named
-/// by its triple as in `x86_64-apple-darwin`.
+/// Compiles programs into an object file, for this machine or for another one with the same kind of
+/// processor, named by its triple, for example `x86_64-apple-darwin`.
 ///
 /// # Errors
-/// [`CodegenError::Unsupported`] if there is no code generator for the machine; [`CodegenError::Bug`] if a generated
-/// function is refused.
+/// [`CodegenError::Unsupported`] if there is no code generator for the machine; [`CodegenError::Bug`] if a
+/// generated function is refused.
 pub fn object(
     programs: &[ObjectProgram<'_>],
     library: Library,

@@ -55,7 +55,7 @@ impl Emitter<'_, '_> {
         }
     }
 
-    /// Min or max as `ir` defines them: never a number for a NaN.
+    /// Min or max as `ir` defines them: NaN if an operand is NaN.
     fn ordered(&mut self, condition: FloatCC, a: Value, b: Value) -> Value {
         let first = self.compare(condition, a, b);
         let is_number = self.compare(FloatCC::Equal, a, a);

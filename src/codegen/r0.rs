@@ -24,8 +24,8 @@ impl Emitter<'_, '_> {
         }
     }
 
-    /// The parts for a pair of operands: see `ir::r0`, whose operations these are. A disjunction is the dual
-    /// of a conjunction there; here its signs are worked into the formulas, which changes no bit.
+    /// The parts for a pair of operands, by the operations of `ir::r0`. There a disjunction is the dual of a
+    /// conjunction; here its signs are included in the formulas, which changes no bit.
     fn r0_parts(&mut self, (u, a): Operand, (v, b): Operand, junction: Junction) -> R0Parts {
         let key = (u, v, junction);
         if let Some(parts) = self.parts.get(&key) {
@@ -56,7 +56,7 @@ impl Emitter<'_, '_> {
         parts
     }
 
-    /// The parts for operands in the order in which they were met first, and whether that is the other order.
+    /// The parts for operands in the order of their first occurrence, and whether that order is reversed.
     fn shared_parts(&mut self, u: Operand, v: Operand, junction: Junction) -> (R0Parts, bool) {
         if u.0 != v.0 && self.parts.contains_key(&(v.0, u.0, junction)) {
             (self.r0_parts(v, u, junction), true)
@@ -103,7 +103,7 @@ impl Emitter<'_, '_> {
             None => self.r0_tau(p, junction),
         };
         let (lesser, greater) = self.weights_of_tau(tau, p.small, junction);
-        // u has the lesser weight where small == (u is the near operand)
+        // u has the smaller weight where small == (u is the near operand)
         let u_is_near = match (junction, swapped) {
             (Junction::And, false) | (Junction::Or, true) => p.less,
             (Junction::And, true) | (Junction::Or, false) => p.greater,
@@ -130,7 +130,7 @@ impl Emitter<'_, '_> {
         (lesser, greater)
     }
 
-    /// u + v ∓ √(u² + v²) as printed in every textbook: loses all digits of a small result between large
+    /// u + v ∓ √(u² + v²) as printed in every textbook. It loses all digits of a small result of large
     /// operands.
     fn textbook_value(&mut self, a: Value, b: Value, junction: Junction) -> Value {
         let sum = self.builder.ins().fadd(a, b);
@@ -153,19 +153,19 @@ impl Emitter<'_, '_> {
     }
 
     fn hypotenuse(&mut self, a: Value, b: Value) -> Value {
-        // in one order, so that the weights of both operands share the root
+        // in one order for both, so that the weights of both operands share the root
         let (a, b) = if a.as_u32() <= b.as_u32() { (a, b) } else { (b, a) };
         let (a2, b2) = (self.builder.ins().fmul(a, a), self.builder.ins().fmul(b, b));
         let squares = self.builder.ins().fadd(a2, b2);
         self.builder.ins().sqrt(squares)
     }
 
-    /// The operations of `ir::r0::and_scaled`. Only the ratio q = m/M is squared, so nothing overflows that
-    /// need not.
+    /// The operations of `ir::r0::and_scaled`. Only the ratio q = m/M is squared, which avoids needless
+    /// overflow.
     fn scaled(&mut self, a: Value, b: Value, junction: Junction) -> Scaled {
         let less = self.compare(FloatCC::LessThan, a, b);
         let greater = self.compare(FloatCC::LessThan, b, a);
-        // one comparison for both, so that a NaN is one of them
+        // one comparison for both, so that a NaN stays one of the two
         let (min, max) = (self.select(less, a, b), self.select(less, b, a));
         let sum = self.builder.ins().fadd(a, b);
         let (zero, one) = (self.constant(0.0), self.constant(1.0));
@@ -173,7 +173,7 @@ impl Emitter<'_, '_> {
             Junction::And => (min, max, self.compare(FloatCC::LessThan, zero, sum)),
             Junction::Or => (max, min, self.compare(FloatCC::LessThan, sum, zero)),
         };
-        // on the small branch the operand that the result is near to is the smaller in magnitude
+        // on the small branch the operand close to the result is the smaller in magnitude
         let (m, big) = (self.select(small, near, far), self.select(small, far, near));
         let ratio = self.builder.ins().fdiv(m, big);
         // exact at a tie, and a number at 0/0 and ∞/∞
@@ -198,7 +198,7 @@ impl Emitter<'_, '_> {
 
     fn scaled_weight(&mut self, a: Value, b: Value, junction: Junction) -> Value {
         let s = self.scaled(a, b, junction);
-        // with the signs of the operands in it, τ serves ∧ in the form that `weights_of_tau` expects of it
+        // with the signs of the operands, τ has the form that `weights_of_tau` expects for ∧
         let turned = self.negate(s.tau);
         let tau = self.select(s.small, s.tau, turned);
         let (lesser, greater) = self.weights_of_tau(tau, s.small, Junction::And);

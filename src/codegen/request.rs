@@ -1,37 +1,36 @@
-//! What is to be compiled: a graph, its outputs, and the shape of the function.
+//! A request for compilation: a graph, its outputs, and the shape of the function.
 
 use cranelift_codegen::ir::Value;
 
 use crate::ir::{Forms, Graph, Node};
 use crate::precision::Precision;
 
-/// How the processor rounds while a range program runs.
+/// The rounding of the processor while a range program runs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum Rounding {
-    /// Towards +∞: the caller sees to it.
+    /// Towards +∞, as set by the caller.
     Upward,
     /// To nearest, as everywhere else.
     Nearest,
 }
 
-/// How a program is called. Pointers to parameters and uniforms, if it takes any, come last.
+/// The shape of a program's call. Pointers to parameters and uniforms, if it takes any, come last.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum Shape {
     /// `fn(x, y, z, out: *mut T)`: the outputs at one point, one after the other.
     Point,
     /// `fn(columns: *const *mut T, blocks: usize)`: columns x, y, z, then one per input and one per output,
-    /// all of them `blocks` × [`Precision::lanes`] long; no alignment asked for.
+    /// all of them `blocks` × [`Precision::lanes`] long, without requirements of alignment.
     Batch,
     /// `fn(box: *const [f64; 6], out: *mut [f64; 2])`: the range of the one output over a box, called with
-    /// this rounding; `f64` only, and only for graphs that `range_is_supported`
-    /// names.
+    /// this rounding. For `f64` only, and only for graphs that `range_is_supported` accepts.
     Range(Rounding),
-    /// The ranges of the outputs, as [`Shape::Range`], of which the others are derivatives of the first: NaN where that
-    /// may jump.
+    /// The ranges of several outputs, called like [`Shape::Range`]. All but the first are derivatives of the
+    /// first, and NaN where it may jump.
     Slopes(Rounding),
 }
 
-/// What is to be compiled.
+/// A request for compilation.
 #[derive(Debug, Clone, Copy)]
 pub struct Request<'a> {
     /// The graph; only what the outputs need of it is computed.
@@ -40,11 +39,11 @@ pub struct Request<'a> {
     pub inputs: &'a [Node],
     /// The nodes whose values are wanted.
     pub outputs: &'a [Node],
-    /// The type to compute in.
+    /// The type of the numbers.
     pub precision: Precision,
-    /// How the program is called.
+    /// The shape of the program's call.
     pub shape: Shape,
-    /// How R₀ is evaluated.
+    /// The form in which R₀ is evaluated.
     pub forms: &'a Forms,
     /// Whether the function takes one more argument, a pointer to the parameters of the graph.
     pub parameters: bool,
@@ -64,7 +63,7 @@ impl Precision {
     }
 }
 
-/// The pointers to parameters and uniforms, as far as a program has them, from its last arguments.
+/// The pointers to parameters and uniforms, if a program has them, from its last arguments.
 pub(super) fn pointers(request: Request<'_>, last: &[Value]) -> [Option<Value>; 2] {
     let parameters = if request.parameters { last.first() } else { None };
     let uniforms = if request.uniforms { last.last() } else { None };

@@ -19,7 +19,7 @@ use super::sine::{self, Wanted};
 use crate::ir::{Axis, Expr, Node, Unary, UnaryFunction};
 use crate::precision::Precision;
 
-/// The code generator's own texts of a program.
+/// The texts of a program that the code generator prints.
 #[derive(Debug, Clone)]
 pub struct Listing {
     /// Cranelift's intermediate representation, before optimisation.
@@ -76,11 +76,11 @@ fn build(request: Request<'_>, listing: bool) -> Result<(Code, Listing), Codegen
 pub(super) struct Named<'a> {
     pub name: &'a str,
     pub linkage: Linkage,
-    /// Whose functions of the mathematical library it calls.
+    /// The mathematical library whose functions it calls.
     pub library: Library,
 }
 
-/// A function that a module has.
+/// A function of a module.
 pub(super) struct Defined {
     id: FuncId,
     size: usize,
@@ -208,7 +208,7 @@ fn declare_hosts(
     Ok(hosts)
 }
 
-/// The arguments of sines and cosines that functions of `sine` find.
+/// The arguments whose sines and cosines are found by functions of `sine`.
 pub(super) fn waves(request: Request<'_>, needed: &[Node]) -> FxHashMap<Node, Wanted> {
     let mut waves: FxHashMap<Node, Wanted> = FxHashMap::default();
     if matches!(request.shape, Shape::Range(_) | Shape::Slopes(_)) {
@@ -307,7 +307,7 @@ fn batch(
     builder.ins().return_(&[]);
 }
 
-/// What a program is given.
+/// The arguments of a program.
 struct Arguments {
     coordinates: [Value; 3],
     inputs: FxHashMap<Node, Value>,
@@ -316,7 +316,7 @@ struct Arguments {
     uniforms: Option<Value>,
 }
 
-/// The values of all needed nodes, in the graph's order, beside those that were given.
+/// The values of all needed nodes, in the graph's order, in addition to those that were given.
 fn nodes(
     emitter: &mut Emitter<'_, '_>,
     request: Request<'_>,
@@ -350,7 +350,8 @@ fn nodes(
     values
 }
 
-/// What the outputs of a program depend on, down to its inputs and without them, in the graph's order.
+/// The nodes on which the outputs of a program depend, down to its inputs but without them, in the graph's
+/// order.
 pub(super) fn needed(request: Request<'_>) -> Vec<Node> {
     let known: FxHashSet<Node> = request.inputs.iter().copied().collect();
     let mut seen: FxHashSet<Node> = FxHashSet::default();

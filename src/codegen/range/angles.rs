@@ -29,15 +29,15 @@ const COEFFICIENTS: [f64; 13] = [
 /// tan(π/8). Tangents above it are replaced by those of π/4 less.
 const STEEP: f64 = 0.41421356237309503;
 
-/// What an angle is widened by, relative: at most 8 roundings here, in either direction, and one and a half in
-/// the library.
+/// Relative widening of an angle: at most 8 roundings here, in either direction, and one and a half in the
+/// library.
 const MARGIN: f64 = 16.0 * ULP;
 
-/// What it is widened by where its tangent underflows.
+/// Absolute widening of an angle where its tangent underflows.
 const LEAST: f64 = 1e-300;
 
-/// Points nearer to the origin than this are moved away from it by a factor: so close to the least number, a product
-/// with a tangent may be off by as much as itself.
+/// Points nearer to the origin than this are moved away from it by a factor. So close to the smallest number,
+/// the error of a product with a tangent may be as large as the product.
 const TINY: f64 = 1e-280;
 const FACTOR: f64 = (1_u64 << 60) as f64;
 
@@ -47,7 +47,7 @@ impl Ranges<'_, '_> {
         self.angle(a, one)
     }
 
-    /// The angles of the points (x, y), and where they may jump: a mask.
+    /// The angles of the points (x, y), and a mask of where they may jump.
     pub(super) fn atan2(&mut self, y: Value, x: Value) -> (Value, Value) {
         let zero = self.emitter.constant(0.0);
         let [low, high] = [BoundLane::Low, BoundLane::High].map(|lane| self.both(x, lane));
@@ -109,7 +109,7 @@ impl Ranges<'_, '_> {
         self.fadd(angle, margin)
     }
 
-    /// By pairs, so that half of the products do not wait for each other.
+    /// Evaluated by pairs, so that half of the products do not wait for each other.
     fn polynomial(&mut self, s: Value) -> Value {
         let square = self.fmul(s, s);
         let mut coefficients = COEFFICIENTS.iter().rev();

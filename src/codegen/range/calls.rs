@@ -1,7 +1,7 @@
-//! Ranges of functions that have no machine instruction: found by the rules of `ir`, which programs call.
+//! Ranges of functions that have no machine instruction. Programs call the rules of `ir` for them.
 //!
-//! Those rules round to nearest. A program that rounds upwards calls them through a few instructions that put
-//! the processor's rounding back for the time of the call.
+//! These rules round to nearest. A program that rounds upwards calls them through a few instructions that
+//! reset the processor's rounding for the time of the call.
 
 use cranelift_codegen::ir::condcodes::FloatCC;
 use cranelift_codegen::ir::{
@@ -32,8 +32,8 @@ extern "C" fn find_range(bounds: &mut Bounds, number: usize) {
 
 /// [`find_range`] for a caller that rounds upwards.
 #[cfg(all(target_arch = "x86_64", unix))]
-// SAFETY: called by range programs alone, by the C convention of this system and with the arguments of
-// `find_range`, which are left in their registers. The stack is aligned at the call and put back after it, as is
+// SAFETY: only range programs call it, by the C convention of this system and with the arguments of
+// `find_range`, which stay in their registers. The stack is aligned at the call and restored after it. So is
 // the control register, whose state in between is that at the start of every program (0x1f80).
 #[unsafe(naked)]
 unsafe extern "C" fn find_range_to_nearest(bounds: &mut Bounds, number: usize) {
@@ -50,7 +50,7 @@ unsafe extern "C" fn find_range_to_nearest(bounds: &mut Bounds, number: usize) {
     )
 }
 
-/// Never called here: programs that round upwards are refused.
+/// Never called on this system, where programs that round upwards are refused.
 #[cfg(not(all(target_arch = "x86_64", unix)))]
 extern "C" fn find_range_to_nearest(bounds: &mut Bounds, _: usize) {
     bounds.fill(f64::NAN);
@@ -69,7 +69,7 @@ pub(in crate::codegen) fn register(linker: &mut JITBuilder) {
     linker.symbol(symbol(Rounding::Upward), find_range_to_nearest as *const u8);
 }
 
-/// The function that a program calls for ranges, if it has to.
+/// The function that a program calls for ranges, if it needs one.
 pub(in crate::codegen) fn declare(
     module: &mut impl Module,
     function: &mut Function,
@@ -87,7 +87,7 @@ pub(in crate::codegen) fn declare(
 }
 
 impl Ranges<'_, '_> {
-    /// The range of a function. There is no answer where it is undefined or very large.
+    /// The range of a function. There is no answer where the function is undefined or very large.
     pub(super) fn call(&mut self, function: RangeFunction, operands: [Value; 2]) -> Value {
         let Some(host) = self.host else { return self.pair(f64::NAN, f64::NAN) };
         let slot = *self.bounds.get_or_insert_with(|| {

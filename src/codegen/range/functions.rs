@@ -1,8 +1,8 @@
-//! The functions whose ranges programs ask for by a call, and their numbers.
+//! The functions whose ranges programs find by a call, and their numbers.
 
 use crate::ir::{BinaryFunction, UnaryFunction};
 
-/// A function whose range programs call for.
+/// A function whose range programs find by a call.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(in crate::codegen) enum RangeFunction {
     Unary(UnaryFunction),

@@ -1,6 +1,6 @@
-//! What range programs can compute: an instruction for each node of a graph, and whether all of them stay finite.
+//! The instructions of range programs, one for each node of a graph, and whether all results stay finite.
 //!
-//! Only graphs are taken whose every node is finite over [`REACH`], and so small that no square overflows.
+//! Only graphs are accepted whose nodes are all finite over [`REACH`], and so small that no square overflows.
 
 use std::collections::HashMap;
 
@@ -13,19 +13,19 @@ use crate::ir::{
     Region, Unary, UnaryFunction,
 };
 
-/// Boxes within this distance of the origin are answered by machine code.
+/// Machine code answers for boxes within this distance of the origin.
 pub const REACH: f64 = 1e9;
 
 /// Values beyond this might overflow in a product or in the bound of one.
 const LARGEST: f64 = 1e300;
 
-/// Operands of R₀ beyond this might have squares that do.
+/// Operands of R₀ beyond this might have squares that overflow.
 const LARGEST_OPERAND: f64 = 1e150;
 
 /// Divisors nearer to 0 are left to the interpreter.
 pub(super) const LEAST_DIVISOR: f64 = 1e-60;
 
-/// Values of called functions from here on are left to it, too.
+/// Values of called functions at or above this are left to the interpreter, too.
 pub(super) const LARGEST_CALL: f64 = 1e60;
 
 /// Whether machine code can answer for this graph.
@@ -38,7 +38,7 @@ pub fn knows(graph: &Graph) -> bool {
     Instructions::of(graph).is_some()
 }
 
-/// What a range program does for one node.
+/// The instruction of a range program for one node.
 #[derive(Clone, Copy)]
 pub(super) enum Instruction {
     Constant(f64),
@@ -54,13 +54,15 @@ pub(super) enum Instruction {
     },
     Unary(RangeUnary, Node),
     Binary(RangeBinary, Node, Node),
-    /// By a constant or a parameter.
+    /// A quotient by a constant or a parameter.
     Divide(Node, Node),
-    /// By a node that may vanish: where it is within [`LEAST_DIVISOR`] of 0 the program has no answer.
+    /// A quotient by a node that may vanish. Where the node is within [`LEAST_DIVISOR`] of 0 the program has
+    /// no answer.
     Quotient(Node, Node),
     /// The share of the first in the smaller of both: a derivative.
     Share(Node, Node),
-    /// One of two values: the first where a share is 1, the second where it is 0, and anything between them otherwise.
+    /// One of two values: the first where a share is 1, the second where it is 0, and anything between them
+    /// otherwise.
     Choice {
         values: [Node; 2],
         share: Node,
@@ -102,7 +104,7 @@ pub(super) enum RangeBinary {
 pub(in crate::codegen) struct Instructions(pub(super) Vec<Instruction>);
 
 impl Instructions {
-    /// `None` if the graph has an operation that range programs do not have.
+    /// `None` if the graph has an operation that range programs lack.
     pub fn of(graph: &Graph) -> Option<Self> {
         let choices: HashMap<Node, Choice> = Choice::all(graph).into_iter().map(|c| (c.node(), c)).collect();
         let instruction = |(node, expr)| {
@@ -114,7 +116,7 @@ impl Instructions {
 }
 
 impl Instruction {
-    /// `None` if its share may be anything, as far as the graph says.
+    /// `None` if the graph does not restrict its share.
     fn choice(graph: &Graph, choice: &Choice) -> Option<Self> {
         let (share, one) = choice.share();
         let is_share = matches!(graph.expr(share), Expr::Binary(Binary::MinWeight | Binary::MaxWeight, ..));
@@ -190,10 +192,10 @@ impl RangeBinary {
     }
 }
 
-/// Whether no bound can overflow for a box within [`REACH`], for these parameters and uniforms, as far as the
-/// program has an answer. A quotient by a node that may vanish is as large as [`LEAST_DIVISOR`] allows; one by a
-/// number that is zero is not finite. Roots are those of positive numbers, and called functions are below
-/// [`LARGEST_CALL`].
+/// Whether no bound can overflow for a box within [`REACH`], for these parameters and uniforms, where the
+/// program has an answer. A quotient by a node that may vanish is assumed to be as large as [`LEAST_DIVISOR`]
+/// allows; a quotient by a number that is zero is not finite. Roots are those of positive numbers, and called
+/// functions are below [`LARGEST_CALL`].
 pub fn stays_finite(graph: &Graph, evaluator: &RangeEvaluator, numbers: Region<'_>) -> bool {
     let space = Aabb::new(DVec3::splat(-REACH), DVec3::splat(REACH));
     let limits = Limits { least_divisor: LEAST_DIVISOR, largest_call: LARGEST_CALL };
@@ -207,7 +209,7 @@ pub fn stays_finite(graph: &Graph, evaluator: &RangeEvaluator, numbers: Region<'
             Expr::Binary(Binary::And | Binary::Or, a, b) => {
                 within(a, LARGEST_OPERAND) && within(b, LARGEST_OPERAND)
             }
-            // all others overflow only where their result does
+            // all others overflow only if their result does
             Expr::Constant(_)
             | Expr::Coordinate(_)
             | Expr::Parameter(_)

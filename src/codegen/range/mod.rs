@@ -1,16 +1,16 @@
 //! Ranges in machine code: the interval of every node in one register, as [−lo, hi].
 //!
-//! With the lower bound negated both bounds are rounded in the same direction, upwards. A caller that sets
-//! the processor to round upwards ([`Rounding::Upward`]) needs nothing more: every bound is then at or above
-//! the exact one after a single instruction. Elsewhere ([`Rounding::Nearest`]) |v|·2⁻⁵² + 2⁻¹⁰⁰⁰ is added
-//! after each operation. The rules are those of `ir::bounds::range`, but for choices (`ir::bounds::choice`): here they
-//! are sums of products, and reach to zero where they are open. Bounds may be wider by a few ulp, those of R₀ by a few
+//! With the lower bound negated both bounds are rounded in the same direction, upwards. If the caller sets
+//! the processor to round upwards ([`Rounding::Upward`]), a single instruction gives a bound at or above the
+//! exact one. Otherwise ([`Rounding::Nearest`]) |v|·2⁻⁵² + 2⁻¹⁰⁰⁰ is added after each operation. The rules
+//! are those of `ir::bounds::range`, except for choices (`ir::bounds::choice`): here these are sums of
+//! products, and reach to zero where they are open. Bounds may be wider by a few ulp, those of R₀ by a few
 //! ulp of its larger operand.
 //!
-//! Only graphs and boxes are taken for which `instructions` has shown that neither infinity nor NaN can arise: min
-//! and max need not look for them. For others the interpreter answers. Whether a divisor may vanish, a root may be
-//! that of a negative number or a called function be undefined is found out by the program itself, which then
-//! answers NaN.
+//! Only graphs and boxes are accepted for which `instructions` has shown that neither infinity nor NaN can
+//! arise, so min and max need not check for them. The interpreter answers for others. The program itself
+//! detects a divisor that may vanish, a root of a number that may be negative, and a called function that may
+//! be undefined; it then answers NaN.
 
 mod angles;
 mod calls;
@@ -38,25 +38,23 @@ pub use instructions::{REACH, knows, stays_finite, supports};
 /// Relative errors of one rounded operation, in either rounding: 2⁻⁵².
 const ULP: f64 = f64::EPSILON;
 
-/// What a product of two sums is widened by, relative: three roundings of the bound itself, and one and a
-/// half of the program whose values it must hold.
+/// Relative widening of a product of two sums: three roundings of the bound itself, and one and a half of the
+/// program whose values it must contain.
 const MARGIN: f64 = 8.0 * ULP;
 
-/// What R₀ is widened by, relative to √(u² + v²): 3 ulp of the root itself, 2.3 ulp of the result in the
-/// program (see `ir::r0`), which is at most 2.5 roots, and in [`Rounding::Nearest`] the halves of an ulp of
-/// the sums.
+/// Widening of R₀, relative to √(u² + v²): 3 ulp of the root itself, 2.3 ulp of the result in the program
+/// (see `ir::r0`), which is at most 2.5 roots, and in [`Rounding::Nearest`] the halves of an ulp of the sums.
 const R0_MARGIN: f64 = 16.0 * ULP;
 
-/// Operands below 2⁻⁵⁰⁰ may have squares that underflow: more than the result that they have, and than the
-/// root of what is lost.
+/// Absolute widening of R₀, because operands below 2⁻⁵⁰⁰ may have squares that underflow. It is more than
+/// their result, and more than the root of what is lost.
 const R0_UNDERFLOW: f64 = 1e-147;
 
-/// Sums of squares may reach so far below zero in [`Rounding::Nearest`].
+/// Sums of squares may reach this far below zero in [`Rounding::Nearest`].
 const LOST_BELOW_ZERO: f64 = 1e-290;
 
 /// `fn(box: *const [f64; 6], out: *mut [f64; 2])`: the low x, y, z and the high ones in, (low, high) of each
-/// output out; pointers to parameters, and to a pair (low, high) for each uniform, come after them as far as
-/// there are any.
+/// output out; pointers to parameters, and to a pair (low, high) for each uniform, follow if there are any.
 pub(super) fn emit(
     builder: &mut FunctionBuilder<'_>,
     request: Request<'_>,
@@ -144,9 +142,9 @@ struct Ranges<'a, 'f> {
     host: Option<FuncRef>,
     numbers: HashMap<Node, RangeNumber>,
     values: HashMap<Node, Value>,
-    /// A mask: ones in a lane if there is no answer. `None` if there always is one.
+    /// A mask: ones in a lane if there is no answer. `None` if there always is an answer.
     pole: Option<Value>,
-    /// Where the bounds are that a function is called with.
+    /// The place of the bounds with which a function is called.
     bounds: Option<StackSlot>,
 }
 
@@ -223,7 +221,7 @@ impl Ranges<'_, '_> {
         }
     }
 
-    /// A uniform: the bounds as they were given. A program that was given none has NaN.
+    /// A uniform: its bounds as given, or NaN if the program was given none.
     fn uniform(&mut self, uniforms: Option<Value>, i: u32) -> Value {
         let Some(base) = uniforms else { return self.pair(f64::NAN, f64::NAN) };
         let flags = MemFlagsData::new();
@@ -231,8 +229,8 @@ impl Ranges<'_, '_> {
         self.flip(pair, BoundLane::Low)
     }
 
-    /// Two numbers in memory. They are read one by one: as long as they have just been written they cannot be read
-    /// as one vector.
+    /// Two numbers in memory. They are read one by one, because numbers that were just written one by one
+    /// cannot be read quickly as one vector.
     fn load_pair(&mut self, base: Value, offsets: [i32; 2]) -> Value {
         let [low, high] = offsets
             .map(|offset| self.emitter.builder.ins().load(types::F64, MemFlagsData::new(), base, offset));
@@ -247,7 +245,7 @@ impl Ranges<'_, '_> {
         self.emitter.builder.ins().vconst(types::F64X2, handle)
     }
 
-    /// A constant with `low` in one lane and `high` in the other, whichever is meant.
+    /// A constant with `inside` in the given lane and `outside` in the other.
     fn signed(&mut self, lane: BoundLane, inside: f64, outside: f64) -> Value {
         match lane {
             BoundLane::Low => self.pair(inside, outside),
@@ -310,7 +308,7 @@ impl Ranges<'_, '_> {
         self.up(sum)
     }
 
-    /// A vector, or where a number is negative its lanes exchanged; and the number's magnitude in both lanes.
+    /// A vector, with its lanes exchanged if a number is negative, and the number's magnitude in both lanes.
     fn turned(&mut self, v: Value, number: RangeNumber) -> (Value, Value) {
         match number {
             RangeNumber::Constant(c) => {
@@ -338,7 +336,7 @@ impl Ranges<'_, '_> {
         self.up(quotient)
     }
 
-    /// By a range that is meant not to hold 0: times its reciprocals [−1/hi, 1/lo], which are
+    /// Division by a range that should not hold 0: multiplication by its reciprocals [−1/hi, 1/lo], which are
     /// −1 over the bounds of −b.
     fn quotient(&mut self, a: Value, b: Value) -> Value {
         let turned = self.swap(b);
@@ -353,7 +351,7 @@ impl Ranges<'_, '_> {
         self.multiply(a, reciprocals)
     }
 
-    /// There is no answer where a mask has ones.
+    /// Notes that there is no answer where a mask has ones.
     fn fail_where(&mut self, mask: Value) {
         self.pole = Some(match self.pole {
             Some(pole) => self.emitter.builder.ins().bor(pole, mask),
@@ -405,7 +403,7 @@ impl Ranges<'_, '_> {
         self.not_negative(wide)
     }
 
-    /// Cuts off what rounding to nearest and widening put below zero: −lo ≤ 0.
+    /// Cuts off the part below zero that rounding to nearest and widening added: −lo ≤ 0.
     fn not_negative(&mut self, v: Value) -> Value {
         if self.rounding == Rounding::Upward {
             return v;
@@ -415,7 +413,7 @@ impl Ranges<'_, '_> {
     }
 
     fn sqrt(&mut self, v: Value) -> Value {
-        // what rounding may have put below zero
+        // rounding may have moved it below zero
         let lost = if self.rounding == Rounding::Upward { 0.0 } else { LOST_BELOW_ZERO };
         let most = self.pair(lost, f64::INFINITY);
         let is_negative = self.emitter.compare(FloatCC::LessThan, most, v);
@@ -431,13 +429,13 @@ impl Ranges<'_, '_> {
         self.not_negative(wide)
     }
 
-    /// (p·e + q)·(r·e + s) of one node e, where p and r are ±1: from the values at the ends of e, and at the
+    /// (p·e + q)·(r·e + s) of one node e, where p and r are ±1, from the values at the ends of e and at the
     /// point t of e nearest to the vertex.
     fn slab(&mut self, e: Value, first: Affine, second: Affine) -> Value {
         let plain = self.flip(e, BoundLane::Low);
         let turned = self.swap(plain);
-        // a concave product has its largest value at t and its least at an end: [lo, t] and [hi, t] are
-        // looked at; a convex one is looked at at [t, lo] and [t, hi]
+        // a concave product has its largest value at t and its least at an end, so it is evaluated at [lo, t]
+        // and [hi, t]; a convex one at [t, lo] and [t, hi]
         let concave = first.slope != second.slope;
         let (at_vertex, near, far) =
             if concave { (BoundLane::High, turned, plain) } else { (BoundLane::Low, plain, turned) };
@@ -482,8 +480,8 @@ impl Ranges<'_, '_> {
         }
     }
 
-    /// Where a slab has its vertex, halfway between its roots, in both lanes. Where rounding moves it, by d,
-    /// also d² in the lane of the value there, which misses the extreme value by that much.
+    /// The vertex of a slab, halfway between its roots, in both lanes. Where rounding moves it by d, also d²
+    /// in the lane of the value there, which misses the extreme value by d².
     fn vertex(&mut self, first: Affine, second: Affine, at_vertex: BoundLane) -> (Value, Option<Value>) {
         // the root of slope·e ± offset is ∓slope·offset
         let sign = |affine: Affine| if affine.minus { affine.slope } else { -affine.slope };
@@ -520,10 +518,10 @@ impl Ranges<'_, '_> {
     /// The range of a ∧ b or a ∨ b: in the lane `and` the upper bound of a conjunction, in the other that of
     /// a disjunction, because −(u ∧ v) = −u ∨ −v.
     ///
-    /// The bounds are u + v ∓ √(u² + v²) as written, widened by what cancels; where hardly anything else is
-    /// left the operands themselves bound the result, and keep its sign exact: u ∧ v ≤ min(u, v), and with m
-    /// = max(u, v) u ∨ v ≤ 4m where m > 0, ≤ ½m where m < 0 (2 + √2 and 2 − √2 but for underflow in the
-    /// program). So nothing waits for a division after the root.
+    /// The bounds are u + v ∓ √(u² + v²) as written, widened by the cancelled digits. Where hardly any digit
+    /// is left, the operands themselves bound the result and keep its sign exact: u ∧ v ≤ min(u, v), and with
+    /// m = max(u, v) u ∨ v ≤ 4m where m > 0, ≤ ½m where m < 0 (2 + √2 and 2 − √2 but for underflow in the
+    /// program). So no division has to follow the root.
     fn r0(&mut self, a: Value, b: Value, and: BoundLane) -> Value {
         let lost = self.emitter.constant(R0_UNDERFLOW);
         let sum = self.fadd(a, b);

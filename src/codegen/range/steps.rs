@@ -1,5 +1,5 @@
-//! Ranges of functions that jump: shares, weights of R₀, steps. Where the range of a derivative is asked for, what
-//! it is the derivative of must not jump, or the mean value theorem does not hold.
+//! Ranges of functions that jump: shares, weights of R₀, steps. If the range of a derivative is wanted, the
+//! function itself must not jump, or the mean value theorem does not hold.
 
 use cranelift_codegen::ir::condcodes::FloatCC;
 use cranelift_codegen::ir::{InstBuilder, Value};
@@ -24,8 +24,8 @@ impl Ranges<'_, '_> {
         self.emitter.select(b_is_less, zero, share)
     }
 
-    /// 1 − u/√(u² + v²), the derivative of u ∧ v by u: it falls with u, and grows with |v| where u is positive.
-    /// With −u and −v it is that of u ∨ v. Also where it may jump: a mask.
+    /// 1 − u/√(u² + v²), the derivative of u ∧ v by u: it falls with u, and grows with |v| where u is
+    /// positive. With −u and −v it is that of u ∨ v. Also returns a mask of where it may jump.
     pub(super) fn weight(&mut self, u: Value, v: Value) -> (Value, Value) {
         let (sizes_u, sizes_v) = (self.magnitudes(u), self.magnitudes(v));
         let (zero, one) = (self.emitter.constant(0.0), self.emitter.constant(1.0));
@@ -67,19 +67,19 @@ impl Ranges<'_, '_> {
         self.emitter.compare(FloatCC::NotEqual, width, zero)
     }
 
-    /// One value where its share is 1 or 0, the hull of both otherwise.
+    /// One of the two values where its share is 1 or 0, otherwise the hull of both.
     pub(super) fn choice(&mut self, [a, b]: [Value; 2], share: Value) -> Value {
         let [least, most] = [BoundLane::Low, BoundLane::High].map(|lane| self.both(share, lane));
         let (zero, minus_one) = (self.emitter.constant(0.0), self.emitter.constant(-1.0));
         let is_first = self.emitter.compare(FloatCC::LessThanOrEqual, least, minus_one);
         let is_second = self.emitter.compare(FloatCC::LessThanOrEqual, most, zero);
-        // both lanes hold what grows with the range
+        // both lanes grow with the range
         let hull = self.emitter.max(a, b);
         let other = self.emitter.select(is_second, b, hull);
         self.emitter.select(is_first, a, other)
     }
 
-    /// Sees to it that there is no answer where a node may jump.
+    /// Ensures that there is no answer where a node may jump.
     pub(super) fn forbid_jumps(&mut self, instruction: Instruction, value: Value) {
         match instruction {
             Instruction::Unary(RangeUnary::Sign | RangeUnary::Floor | RangeUnary::Round, _)
@@ -87,7 +87,7 @@ impl Ranges<'_, '_> {
                 let steps = self.varies(value);
                 self.fail_where(steps);
             }
-            // a choice that is made neither way
+            // a choice that is not decided
             Instruction::Binary(RangeBinary::MulOrZero, _, b) => {
                 let b = self.values[&b];
                 let (is_open, turned) = (self.varies(b), self.swap(b));
@@ -106,7 +106,7 @@ impl Ranges<'_, '_> {
                 let (_, jumps) = self.weight(self.values[&a], self.values[&b]);
                 self.fail_where(jumps);
             }
-            // continuous, or without an answer where they are not
+            // continuous, or without an answer at jumps
             Instruction::Unary(
                 RangeUnary::Neg | RangeUnary::Abs | RangeUnary::Sqrt | RangeUnary::Atan,
                 _,
@@ -130,7 +130,7 @@ impl Ranges<'_, '_> {
             | Instruction::Divide(..)
             | Instruction::Quotient(..)
             | Instruction::Call(..)
-            // its share is forbidden to be open
+            // its share must not be open
             | Instruction::Choice { .. } => {}
         }
     }

@@ -1,8 +1,8 @@
-//! Sine and cosine in `f64`, by the ways of `libm::sin` and `libm::cos` for nearly all arguments.
+//! Sine and cosine in `f64`, by the algorithms of `libm::sin` and `libm::cos` for nearly all arguments.
 //!
-//! `libm` goes other ways for some: it reduces in more steps where much cancels, and cuts quadrants at
-//! numbers that are a little beyond odd multiples of π/4. These arguments, one in 1000 of those up to 100,
-//! are recognised by what remains of them; so are those above 50 000, infinity and NaN.
+//! `libm` treats some arguments differently: it reduces in more steps where much cancels, and cuts quadrants
+//! at numbers that are a little beyond odd multiples of π/4. These arguments, one in 1000 of those up to 100,
+//! are recognised by their remainder; so are those above 50 000, infinity and NaN.
 
 use cranelift_codegen::ir::condcodes::FloatCC;
 use cranelift_codegen::ir::{InstBuilder, Value};
@@ -12,13 +12,14 @@ use crate::codegen::emitter::Emitter;
 
 /// The first 33 bits of π/2.
 const QUARTER: f64 = 1.57079632673412561417;
-/// The rest of them.
+/// The remaining bits of π/2.
 const QUARTER_TAIL: f64 = 6.07710050650619224932e-11;
 
-/// Where less than this part of an argument remains, `libm` reduces it further. It compares exponents, so some are
-/// taken that it does not.
+/// `libm` reduces an argument further if less than this part of it remains. It compares exponents, so this
+/// limit also takes some arguments that it does not reduce.
 const CANCELLED: f64 = 1.0 / 65_536.0;
-/// Above this, the argument is near an odd multiple of π/4. Up to nine of them `libm` knows to 20 bits only.
+/// Above this, the argument is near an odd multiple of π/4. `libm` knows the multiples up to the ninth to 20
+/// bits only.
 const NEXT_QUADRANT: f64 = std::f64::consts::FRAC_PI_4 - 1.0 / 65_536.0;
 
 /// sin y = y + y³·(S₀ + y²·S₁ + …) for |y| ≤ π/4
@@ -41,16 +42,16 @@ const COSINE: [f64; 6] = [
     -1.13596475577881948265e-11,
 ];
 
-/// The magnitude of an argument less the nearest multiple of π/2. Its sign comes back at the end: sine is
+/// The magnitude of an argument minus the nearest multiple of π/2. The sign is restored at the end: sine is
 /// odd, cosine even.
 struct Reduced {
-    /// What remains, |y| ≤ π/4, and what it is too large or too small by.
+    /// The remainder y, |y| ≤ π/4, and its error.
     y: Value,
     tail: Value,
-    /// The multiple as a number, and as the last bits of one.
+    /// The multiple as a number, and as the last bits of a number.
     multiple: Value,
     sum: Value,
-    /// A mask of the lanes that `libm` reduces otherwise.
+    /// A mask of the lanes that `libm` reduces in another way.
     rare: Value,
 }
 
@@ -79,7 +80,7 @@ impl Emitter<'_, '_> {
         let (size, least) = (self.abs(y), self.times(x, CANCELLED));
         let most = self.constant(NEXT_QUADRANT);
         let is_small = self.builder.ins().fcmp(FloatCC::LessThan, size, least);
-        // also where it is no number
+        // also true for NaN
         let is_large = self.builder.ins().fcmp(FloatCC::UnorderedOrGreaterThan, size, most);
         let rare = self.builder.ins().bor(is_small, is_large);
         Reduced { y, tail, multiple, sum, rare }
@@ -96,7 +97,7 @@ impl Emitter<'_, '_> {
         let r = self.multiply_add(sixth, high, low);
         let cube = self.builder.ins().fmul(z, y);
 
-        // near zero, where nothing was taken away
+        // near zero, where nothing was subtracted
         let plain = self.multiply_add(z, r, s1);
         let plain = self.builder.ins().fmul(cube, plain);
         // elsewhere

@@ -16,7 +16,7 @@ use crate::codegen::machine::{CodegenError, target};
 use crate::ir::{Forms, Graph};
 use crate::precision::Precision;
 
-/// The address of a function. It is compiled when it is first asked for, and stays for the life of the process.
+/// The address of a function, which is compiled at its first use and stays for the life of the process.
 ///
 /// # Errors
 /// Those of compilation, see `codegen::compile`.
@@ -29,7 +29,7 @@ pub fn address(precision: Precision, wanted: Wanted) -> Result<*const u8, Codege
     address.clone().map(std::ptr::with_exposed_provenance)
 }
 
-/// Compiles a function into executable memory that is never given back.
+/// Compiles a function into executable memory that is never freed.
 fn compile(precision: Precision, wanted: Wanted) -> Result<*const u8, CodegenError> {
     let mut linker = JITBuilder::with_isa(target(0)?, default_libcall_names());
     for function in wanted.functions() {
@@ -89,7 +89,7 @@ fn emit(
     builder.switch_to_block(entry);
     let x = builder.block_params(entry)[0];
     let (graph, forms) = (Graph::default(), Forms::default());
-    // what is common is computed in `f64` for both
+    // the common part is computed in `f64` for both precisions
     let mut emitter = Emitter::new(builder, (Precision::F64, 2), (&graph, &forms), hosts);
     let (is_rare, results) = match precision {
         Precision::F64 => {
@@ -117,8 +117,8 @@ fn emit(
     builder.seal_all_blocks();
 }
 
-/// The functions of the mathematical library, in each lane. The lanes wait in memory: the vector would be
-/// saved before it is known whether there is anything to call.
+/// Calls the functions of the mathematical library in each lane. The lanes wait in memory. Otherwise the
+/// vector would be saved even if nothing is called.
 fn call_by_lanes(
     builder: &mut FunctionBuilder<'_>,
     (precision, wanted): (Precision, Wanted),

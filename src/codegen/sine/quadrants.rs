@@ -1,4 +1,4 @@
-//! Which function of what remains of an argument is its sine or cosine, and with which sign.
+//! The choice of quadrant: sine and cosine of an argument from those of its remainder, with their signs.
 
 use cranelift_codegen::ir::condcodes::IntCC;
 use cranelift_codegen::ir::{InstBuilder, MemFlagsData, Type, Value, types};
@@ -6,24 +6,26 @@ use cranelift_codegen::ir::{InstBuilder, MemFlagsData, Type, Value, types};
 use super::wanted::Wanted;
 use crate::codegen::emitter::{ENDIANNESS, Emitter};
 
-/// 1.5 · 2⁵²: a number below 2⁵¹ that is added to it is rounded to a whole one, which its last bits then hold.
+/// 1.5 · 2⁵². Adding it to a number below 2⁵¹ rounds that to a whole number, which the last bits of the sum
+/// hold.
 pub(super) const TO_WHOLE: f64 = 1.5 / f64::EPSILON;
 /// 2/π
 pub(super) const QUARTERS: f64 = std::f64::consts::FRAC_2_PI;
 
-/// Lanes of `f64` as far as they are known without their quadrants.
+/// Results in lanes of `f64`, before quadrants are chosen.
 pub(super) struct Quadrants {
-    /// Those of what remains when the nearest multiple of π/2 is taken from the magnitude of the argument.
+    /// Sine and cosine of the remainder, which is the magnitude of the argument minus the nearest multiple of
+    /// π/2.
     pub sine: Value,
     pub cosine: Value,
     /// A number whose last bits hold the multiple.
     pub sum: Value,
-    /// A mask of the lanes that `libm` finds in another way.
+    /// A mask of the lanes that `libm` computes in another way.
     pub rare: Value,
 }
 
 impl Emitter<'_, '_> {
-    /// Those that are wanted, the sine first, from what is known of them.
+    /// The wanted results, the sine first, from those of the remainder.
     pub(super) fn choose(&mut self, x: Value, quadrants: &Quadrants, wanted: Wanted) -> Vec<Value> {
         let &Quadrants { sine, cosine, sum, .. } = quadrants;
         let [sine, cosine, multiple] = [sine, cosine, sum].map(|v| self.whole(v));
@@ -35,7 +37,7 @@ impl Emitter<'_, '_> {
         let is_even = self.builder.ins().icmp(IntCC::Equal, last, zero);
         let sign_bit = self.constant(-0.0);
         let sign_bit = self.whole(sign_bit);
-        // bit 1 of the multiple where the sign is, and bit 0
+        // bit 1 of the multiple, moved to the place of the sign, and bit 0
         let [half_turns, quarter_turns] =
             [62, 63].map(|distance| self.builder.ins().ishl_imm_u(multiple, distance));
         let mut results = Vec::new();
@@ -67,7 +69,7 @@ impl Emitter<'_, '_> {
         self.builder.ins().fmul(a, factor)
     }
 
-    /// The bits of numbers, to be moved and chosen.
+    /// The bits of numbers as integers, for shifts and masks.
     fn whole(&mut self, numbers: Value) -> Value {
         self.lanes_as(types::I64X2, numbers)
     }

@@ -1,8 +1,8 @@
-//! Sine and cosine in `f32`, by the ways of `libm::sinf` and `libm::cosf`, which compute in `f64`.
+//! Sine and cosine in `f32`, by the algorithms of `libm::sinf` and `libm::cosf`, which compute in `f64`.
 //!
 //! Each half of a vector is as wide as a whole one in `f64`. Arguments up to 9π/4 are reduced in one step,
-//! others in two. Rare are those beside odd multiples of π/4, where `libm` cuts quadrants at the nearest
-//! number in `f32`, those above 4 · 10⁸, infinity and NaN.
+//! others in two. Rare arguments are left to `libm`: those beside odd multiples of π/4, where `libm` cuts
+//! quadrants at the nearest number in `f32`, those above 4 · 10⁸, infinity and NaN.
 
 use cranelift_codegen::ir::condcodes::FloatCC;
 use cranelift_codegen::ir::{Endianness, InstBuilder, MemFlagsData, Value, types};
@@ -14,7 +14,7 @@ use crate::codegen::emitter::Emitter;
 const QUARTER: f64 = std::f64::consts::FRAC_PI_2;
 /// The first 25 bits of π/2.
 const QUARTER_HEAD: f64 = 1.57079631090164184570;
-/// The rest of them.
+/// The remaining bits of π/2.
 const QUARTER_TAIL: f64 = 1.58932547735281966916e-08;
 
 /// The largest argument that is reduced in one step: 9π/4 in `f32`.
@@ -80,7 +80,7 @@ impl Emitter<'_, '_> {
         let y = self.select(is_near, near, far);
 
         let (size, most, largest) = (self.abs(y), self.constant(NEXT_QUADRANT), self.constant(LARGEST));
-        // also where it is no number
+        // also true for NaN
         let is_beside = self.builder.ins().fcmp(FloatCC::UnorderedOrGreaterThan, size, most);
         let is_large = self.builder.ins().fcmp(FloatCC::GreaterThan, x, largest);
         let rare = self.builder.ins().bor(is_beside, is_large);

@@ -1,4 +1,4 @@
-//! Which of sine and cosine a program asks for, and the names and signatures of the functions that find them.
+//! The choice of sine, cosine or both, and the names and signatures of the functions that find them.
 
 use cranelift_codegen::ir::{AbiParam, Signature, Value, types};
 use cranelift_codegen::isa::CallConv;
@@ -6,7 +6,7 @@ use cranelift_codegen::isa::CallConv;
 use crate::ir::UnaryFunction;
 use crate::precision::Precision;
 
-/// Which of the two are wanted for one argument.
+/// The functions that are wanted for one argument: sine, cosine or both.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Hash)]
 pub struct Wanted {
     pub sine: bool,
@@ -37,7 +37,7 @@ impl Wanted {
         format!("rfm_{functions}_{}", precision.name())
     }
 
-    /// Its signature: a vector for a vector, or two of them, that of the sines first.
+    /// Its signature: one vector to one vector, or to two with the sines first.
     pub fn signature(self, precision: Precision) -> Signature {
         let vector = AbiParam::new(match precision {
             Precision::F32 => types::F32X4,
