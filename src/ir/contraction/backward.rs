@@ -1,7 +1,7 @@
-//! The operands that may give a number.
+//! The operands that are possible for a given value.
 //!
-//! Each rule starts from the value of an operation, widened by its rounding error, and returns what is left of
-//! one operand. Rules that are not known to exclude anything return the operand as it is.
+//! Each rule starts from the value of an operation, widened by its rounding error, and returns the remaining
+//! part of one operand. Rules that cannot exclude anything return the operand unchanged.
 
 use std::f64::consts::{FRAC_PI_2, PI};
 
@@ -11,7 +11,7 @@ use crate::interval::Interval;
 use crate::ir::function::{BinaryFunction, UnaryFunction};
 use crate::ir::op::{Binary, Unary};
 
-/// What is left of the operand a of an operation on it, given its value.
+/// The remaining part of the operand a of a unary operation, given its value.
 pub fn unary(op: Unary, value: Interval, a: Interval) -> Option<Interval> {
     match op {
         Unary::Neg => meet(a, -value),
@@ -84,8 +84,8 @@ fn logarithm(value: Interval, a: Interval) -> Option<Interval> {
     meet(a, Interval { lo: value.lo.max(0.0) * (1.0 - 1e-12), hi: value.hi * (1.0 + 1e-12) })
 }
 
-/// The angles within an interval whose sine may be a value: one piece between a trough and a crest after the
-/// other.
+/// The angles within an interval whose sine may be a value, searched piece by piece between a trough and a
+/// crest.
 fn wave(value: Interval, a: Interval) -> Option<Interval> {
     let value = meet(value, Interval { lo: -1.0, hi: 1.0 })?;
     if a.width() > 8.0 * PI || a.lo.abs().max(a.hi.abs()) > 1e5 {
@@ -106,7 +106,7 @@ fn wave(value: Interval, a: Interval) -> Option<Interval> {
     left
 }
 
-/// What is left of both operands of an operation, given its value.
+/// The remaining parts of both operands of an operation, given its value.
 pub fn binary(op: Binary, value: Interval, a: Interval, b: Interval) -> Option<[Interval; 2]> {
     let rounded = value.widened(1);
     match op {
@@ -207,7 +207,7 @@ fn partner(most: f64, other: f64) -> f64 {
     found + 1e-9 * (found.abs() + most.abs())
 }
 
-/// What is left of the base of a whole power.
+/// The remaining part of the base of a whole power.
 pub fn power(value: Interval, a: Interval, exponent: u32) -> Option<Interval> {
     let value = value.widened(exponent.saturating_mul(2).min(200));
     if exponent.is_multiple_of(2) {
@@ -221,7 +221,7 @@ pub fn power(value: Interval, a: Interval, exponent: u32) -> Option<Interval> {
     meet(a, Interval { lo: signed(value.lo, false), hi: signed(value.hi, true) })
 }
 
-/// A bound of the root of a number that is not negative.
+/// A bound of the root of a non-negative number.
 fn root(x: f64, exponent: u32, up: bool) -> f64 {
     if x == 0.0 || x == f64::INFINITY {
         return x;
@@ -234,19 +234,19 @@ fn root(x: f64, exponent: u32, up: bool) -> f64 {
     root * if up { 1.0 + 1e-12 } else { 1.0 - 1e-12 }
 }
 
-/// The numbers of an interval whose magnitude is in another one.
+/// The numbers of an interval whose magnitude lies in another interval.
 fn either_sign(a: Interval, magnitude: Interval) -> Option<Interval> {
     meet_either(a, [magnitude, -magnitude])
 }
 
-/// What is left of e in (±e + q)·(±e + s), with the slopes and offsets of both factors.
+/// The remaining part of e in (±e + q)·(±e + s), with the slopes and offsets of both factors.
 pub fn slab(value: Interval, e: Interval, first: (f64, f64), second: (f64, f64)) -> Option<Interval> {
     let roots = [-first.1 * first.0, -second.1 * second.0];
     if roots.iter().any(|root| !root.is_finite()) {
         return Some(e);
     }
     let (low, high) = (roots[0].min(roots[1]), roots[0].max(roots[1]));
-    // σ·(e − low)·(e − high): signs are exact, for those of differences are
+    // σ·(e − low)·(e − high): its sign is exact, because the signs of differences are
     let sigma = first.0 * second.0;
     if sigma < 0.0 && value.lo == 0.0 {
         return meet(e, Interval { lo: low, hi: high });

@@ -1,4 +1,4 @@
-//! All nodes of a graph: forwards their values, backwards what these leave of the operands.
+//! Contraction over all nodes of a graph: values forwards, remaining parts of operands backwards.
 
 use std::cell::RefCell;
 
@@ -27,13 +27,13 @@ pub struct Contractor {
     operands: Vec<SmallVec<[Operand; 3]>>,
     /// In the order of the nodes.
     choices: Vec<Choice>,
-    /// Linear forms that something else is computed from, or the root.
+    /// Linear forms that are operands of something else, or the root.
     pub(super) forms: Vec<Node>,
     coordinates: [Option<Node>; 3],
     pub(super) tables: Tables,
 }
 
-/// What a node is computed from.
+/// An operand of a node.
 #[derive(Debug, Clone, Copy)]
 struct Operand {
     node: Node,
@@ -56,12 +56,12 @@ pub(super) struct Scratch {
     pub values: Vec<Interval>,
     /// Whether a node may be undefined somewhere.
     pub may_fail: Vec<bool>,
-    /// Whether a node may be infinite somewhere. Values that are read from outside are finite, even if
-    /// nothing bounds them.
+    /// Whether a node may be infinite somewhere. Values that are read from outside are finite, even if they
+    /// are not bounded.
     pub may_be_infinite: Vec<bool>,
     pub slopes: Vec<[Interval; 3]>,
     pub linear: Vec<[Interval; 4]>,
-    /// What is known of some nodes beforehand, in their order.
+    /// Known values of some nodes, in the order of the nodes.
     pub known: Vec<(Node, Interval)>,
 }
 
@@ -114,12 +114,13 @@ impl Contractor {
         }
     }
 
-    /// How many nodes a call visits.
+    /// The number of nodes that a call visits.
     pub fn len(&self) -> usize {
         self.rules.len()
     }
 
-    /// Forwards and backwards. `None` if the root is positive nowhere, true if it is everywhere.
+    /// Runs forwards and backwards. `None` if the root is positive nowhere, true if it is positive
+    /// everywhere.
     pub(super) fn pass(&self, region: &Region<'_>, negated: bool, scratch: &mut Scratch) -> Option<bool> {
         self.forward(region, scratch)?;
         let Scratch { values, may_fail, .. } = scratch;
@@ -141,7 +142,7 @@ impl Contractor {
         Some(false)
     }
 
-    /// The numbers that each node may be. `None` if one that the root needs is undefined everywhere.
+    /// Finds the numbers that each node may be. `None` if a node that the root needs is undefined everywhere.
     pub(super) fn forward(&self, region: &Region<'_>, scratch: &mut Scratch) -> Option<()> {
         let Scratch { values, may_fail, may_be_infinite, known, .. } = scratch;
         let mut known = known.iter().peekable();
@@ -156,7 +157,7 @@ impl Contractor {
             for &Operand { node, needed } in &self.operands[i] {
                 let is_unknown = may_fail[node.index()];
                 fails |= is_unknown;
-                // an operand that is undefined where the node is defined says nothing about the node
+                // an operand that may be undefined where the node is defined does not restrict the node
                 is_open |= is_unknown && !needed;
                 reads_infinity |= infinite(node);
             }
@@ -164,18 +165,19 @@ impl Contractor {
             fails |= found.may_fail || reads_infinity && rule.fails_at_infinity(of, infinite);
             let is_infinite =
                 found.range.is_some_and(|range| !range.is_bounded()) && rule.may_be_infinite(of, infinite);
-            // a choice that is made leaves out what may be undefined
+            // a choice that is decided leaves out the operand that may be undefined
             let is_left_out = matches!(*rule, Rule::Plain(Expr::Binary(Binary::MulOrZero, _, b))
                 if is_zero(of(b)) && !may_fail[b.index()]);
             let (is_open, fails) = (is_open && !is_left_out, fails && !is_left_out);
             let value = match (found.range, is_open) {
                 (Some(range), false) => range,
                 (None, false) if self.needed[i] => return None,
-                // undefined where its value does not matter, or made of something undefined: nothing is known
+                // undefined where its value does not matter, or computed from something undefined: nothing is
+                // known
                 (None, false) | (Some(_) | None, true) => Interval::ALL,
             };
             let value = match choices.next_if(|choice| choice.node().index() == i) {
-                // where an operand is undefined, the value is as well, or that operand is not chosen
+                // where an operand is undefined, the value is undefined, too, or that operand is not chosen
                 Some(choice) => choice.range(of).and_then(|range| meet(value, range)).unwrap_or(value),
                 None => value,
             };
@@ -190,7 +192,7 @@ impl Contractor {
         Some(())
     }
 
-    /// What the value of a node leaves of its operands.
+    /// Restricts the operands of a node by its value.
     fn backward(&self, i: usize, values: &mut [Interval]) -> Option<()> {
         let value = values[i];
         match self.rules[i] {
@@ -234,7 +236,7 @@ impl Contractor {
         Some(())
     }
 
-    /// What is left of a box.
+    /// The remaining part of a box.
     pub(super) fn read_box(&self, values: &[Interval], space: &mut Aabb) -> Option<()> {
         for (axis, node) in self.coordinates.into_iter().enumerate() {
             let Some(value) = node.and_then(|node| values.get(node.index())) else { continue };

@@ -1,4 +1,5 @@
-//! The linear forms in a graph: their coefficients, what is found of them, and what follows from others.
+//! The linear forms in a graph: their coefficients, the values found for them, and consequences of other
+//! forms.
 
 use super::contractor::{Contractor, Scratch};
 use super::linear::{LinearForm, LinearProgram, ZERO, plus};
@@ -24,8 +25,8 @@ pub fn collect(contractor: &Contractor, nodes: &[Node], scratch: &mut Scratch, o
     }
 }
 
-/// What follows from forms with known ranges for other forms, the `nodes` of a graph: for the next pass over
-/// it.
+/// The ranges of other forms, the `nodes` of a graph, that follow from forms with known ranges. They serve
+/// the next pass over the graph.
 pub fn bound(
     contractor: &Contractor,
     nodes: &[Node],

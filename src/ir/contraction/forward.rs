@@ -1,4 +1,4 @@
-//! The numbers that an operation may give.
+//! The numbers that an operation may return.
 
 use super::rule::Rule;
 use super::sets::meet;
@@ -12,7 +12,7 @@ use crate::ir::op::{Binary, Unary};
 pub const POSITIVE: Interval = Interval { lo: 0.0, hi: f64::INFINITY };
 const UP_TO_ONE: Interval = Interval { lo: -1.0, hi: 1.0 };
 
-/// What a node may be.
+/// The possible values of a node.
 #[derive(Debug, Clone, Copy)]
 pub struct Numbers {
     /// The numbers; `None` if it is undefined everywhere.
@@ -27,13 +27,13 @@ impl From<Interval> for Numbers {
     }
 }
 
-/// What an operation gives for operands in a domain; undefined for the others.
+/// The values of an operation for operands in a domain; it is undefined for the others.
 fn partial(operand: Interval, domain: Interval, f: impl Fn(Interval) -> Interval) -> Numbers {
     let defined = meet(operand, domain);
     Numbers { range: defined.map(f), may_fail: defined != Some(operand) }
 }
 
-/// What a node with this rule may be; `of` gives that of its operands.
+/// The possible values of a node with this rule; `of` returns those of its operands.
 pub fn numbers(
     rule: &Rule,
     of: impl Fn(crate::ir::Node) -> Interval,
@@ -130,7 +130,7 @@ fn conjunction(a: Interval, b: Interval) -> Interval {
     Interval { lo: known.lo, hi: known.hi.min(hi) }
 }
 
-/// A sum, rounded outwards only where it rounds at all: faces at round numbers stay there.
+/// A sum, rounded outwards only if it is not exact, so that faces at round numbers stay there.
 pub fn sum(a: Interval, b: Interval) -> Interval {
     let (lo, low_error) = exact_sum(a.lo, b.lo);
     let (hi, high_error) = exact_sum(a.hi, b.hi);
@@ -151,7 +151,8 @@ pub fn sum(a: Interval, b: Interval) -> Interval {
     Interval { lo, hi }
 }
 
-/// a + b as rounded, and what is missing (Knuth's two-sum). An overflow misses something of the other sign.
+/// a + b as rounded, and the missing part (Knuth's two-sum). For an overflow the missing part has the other
+/// sign.
 fn exact_sum(a: f64, b: f64) -> (f64, f64) {
     let s = a + b;
     if !s.is_finite() {
@@ -195,8 +196,8 @@ impl Squared for Interval {
     }
 }
 
-/// aᵇ. A negative base has a power only where the exponent is whole, or if it is infinite: (−∞)^0.1 is ∞. So
-/// it may have at 0 if the exponent is negative: (−0)^−1 is −∞.
+/// aᵇ. A negative base has a power only where the exponent is whole, or if the base is infinite: (−∞)^0.1 is
+/// ∞. With a negative exponent this includes the base −0: (−0)^−1 is −∞.
 fn general_power(a: Interval, b: Interval) -> Numbers {
     let whole = b.lo == b.hi && b.lo.fract() == 0.0;
     let may_be_whole = whole || b.lo != b.hi;

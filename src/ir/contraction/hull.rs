@@ -8,8 +8,8 @@ use crate::geom::Aabb;
 use crate::ir::bounds::range::Region;
 
 impl Contractor {
-    /// Cuts off parts of a box where the formula is not positive. With `found` it also passes on what it has
-    /// found of the linear forms in the formula.
+    /// Cuts off parts of a box where the formula is not positive. With `found` it also returns the values
+    /// that it has found for the linear forms in the formula.
     pub fn contract(
         &self,
         wanted: &Wanted<'_>,
@@ -19,7 +19,7 @@ impl Contractor {
         self.contract_given(&[], wanted, space, found)
     }
 
-    /// Cuts off parts of a box, where linear forms of other formulas have known ranges as well.
+    /// Cuts off parts of a box in which linear forms of other formulas have known ranges, too.
     pub fn contract_given(
         &self,
         given: &[LinearForm],
@@ -88,7 +88,8 @@ mod tests {
         (graph, nodes[nodes.len() - 1])
     }
 
-    /// Contracts a box in all ways, and compares with the formula at points, whose coordinates are parts of its sides.
+    /// Contracts a box in all ways, and compares with the formula at points, whose coordinates are parts of
+    /// its sides.
     fn cuts_off_no_point(
         steps: &[(usize, usize, usize, f64)],
         space: Aabb,
@@ -164,7 +165,7 @@ mod tests {
             let all: Vec<Node> = graph.nodes().map(|(node, _)| node).collect();
             let mut values = vec![0.0; all.len()];
             Interpreter::new(&graph, &all).eval_f64(p.to_array(), &mut values);
-            // the rounding of what is added up to a gradient
+            // the rounding of the terms of a gradient
             let slack = 1e-12 * values.iter().fold(1.0, |most: f64, value| most.max(value.abs()));
             for (node, slope) in gradient.into_iter().zip(slopes.into_iter().flatten()) {
                 let found = values[node.index()];
@@ -174,7 +175,7 @@ mod tests {
         }
     }
 
-    /// Numbers that are infinite somewhere: what they are multiplied by, divide or are raised to says nothing there.
+    /// Where a number is infinite, its factors, dividends and exponents are not restricted.
     #[test]
     fn infinite_values_cut_off_nothing() {
         type Steps = &'static [(usize, usize, usize, f64)];

@@ -1,16 +1,17 @@
 //! Linear forms with known ranges, and the box around the points that they leave.
 //!
-//! Forms that are not parallel to the axes bound a coordinate only together: a turned box, a wedge of
-//! half-spaces. The largest coordinate is a linear program; its dual gives multipliers λ ≥ 0 of the
-//! constraints aᵢ·p ≤ bᵢ with Σ λᵢaᵢ = d, and then d·p ≤ Σ λᵢbᵢ. The multipliers are found in floating point.
-//! The bound is then computed in intervals with what they miss, so it holds whatever they are.
+//! Forms that are not parallel to the axes bound a coordinate only together, for example in a turned box or a
+//! wedge of half-spaces. The largest coordinate is the solution of a linear program. Its dual gives
+//! multipliers λ ≥ 0 of the constraints aᵢ·p ≤ bᵢ with Σ λᵢaᵢ = d, and then d·p ≤ Σ λᵢbᵢ. The multipliers are
+//! found in floating point. The bound is then computed in intervals and includes the error of the
+//! multipliers, so it holds for any of them.
 
 use glam::{DMat3, DVec3};
 
 use crate::geom::Aabb;
 use crate::interval::Interval;
 
-/// A linear form of the coordinates whose values are known: `slopes`·p ∈ `range`.
+/// A linear form of the coordinates with known values: `slopes`·p ∈ `range`.
 #[derive(Debug, Clone, Copy)]
 pub struct LinearForm {
     /// The coefficients of x, y, z.
@@ -22,7 +23,7 @@ pub struct LinearForm {
 }
 
 impl LinearForm {
-    /// Forms that are used: more would cost more than they gain.
+    /// Maximum number of forms that are used. More would cost more than they gain.
     pub const MOST: usize = 4096;
 
     /// slopes·p ∈ range, computed with a number of this magnitude added.
@@ -37,13 +38,13 @@ impl LinearForm {
 }
 
 impl LinearForm {
-    /// A bound from below of the distance between a point and the points of a box that the form leaves. All of
-    /// them are relative to the origin of the form.
+    /// A lower bound of the distance between a point and the points of a box that the form leaves. All points
+    /// are relative to the origin of the form.
     pub fn distance(&self, p: DVec3, over: &Aabb) -> f64 {
         let middle = DVec3::from_array(self.slopes.map(|slope| 0.5 * (slope.lo + slope.hi)));
         let error = DVec3::from_array(self.slopes.map(|slope| 0.5 * slope.width().next_up()));
         let reach = over.min.abs().max(over.max.abs());
-        // middle·q is at least this for all q that are left
+        // middle·q is at least this for all remaining q
         let least = self.range.lo - error.dot(reach);
         let rounding = 1e-14 * (middle.abs().dot(reach + p.abs()) + self.range.lo.abs());
         let distance = (least - middle.dot(p) - rounding) / middle.length() * (1.0 - 1e-14);
@@ -71,11 +72,11 @@ impl Constraint {
 
 pub const ZERO: Interval = Interval::point(0.0);
 
-/// Steps of one linear program. Some five are needed.
+/// Maximum number of steps of one linear program. Some five are needed.
 const MOST_PIVOTS: usize = 60;
 
-/// Rounds over the six sides. A multiplier that misses a millionth of a millionth of a side in the search
-/// region, which is huge, needs several.
+/// Number of rounds over the six sides. The search region is huge, so several rounds are needed if a
+/// multiplier misses a millionth of a millionth of a side.
 const MOST_ROUNDS: usize = 8;
 
 pub fn plus(a: Interval, b: Interval) -> Interval {
@@ -88,7 +89,7 @@ pub fn plus(a: Interval, b: Interval) -> Interval {
     }
 }
 
-/// A box and forms with known ranges, of which the ranges of other forms follow.
+/// A box and forms with known ranges, from which the ranges of other forms follow.
 pub struct LinearProgram {
     constraints: Vec<Constraint>,
     /// The largest magnitudes of the coordinates.
@@ -120,10 +121,10 @@ impl LinearProgram {
     }
 }
 
-/// The smallest box around the points of a box that are left by forms of their distance from an origin. False if
-/// none is.
+/// Finds the smallest box around the points of a box that remain under forms of their distance from an
+/// origin. False if no point remains.
 pub fn contract_linear_around(origin: DVec3, forms: &[LinearForm], space: &mut Aabb) -> bool {
-    // one form alone has cut off already what it can
+    // a single form has already cut off what it can
     if forms.len() < 2 {
         return true;
     }
@@ -138,7 +139,7 @@ pub fn contract_linear_around(origin: DVec3, forms: &[LinearForm], space: &mut A
     !left.is_empty()
 }
 
-/// The smallest box around the points of a box that are left by all forms. False if none is.
+/// Finds the smallest box around the points of a box that remain under all forms. False if no point remains.
 pub fn contract_linear(forms: &[LinearForm], space: &mut Aabb) -> bool {
     let turned: Vec<&LinearForm> = forms.iter().filter(|form| is_turned(form)).collect();
     if turned.is_empty() {
@@ -256,7 +257,7 @@ fn most_violated(constraints: &[Constraint], basis: [usize; 3], inverse: &DMat3)
     worst.1
 }
 
-/// The bound that multipliers prove: Σ λb, and what they miss of the direction at its worst in the box.
+/// The bound that multipliers prove: Σ λb, plus the worst effect in the box of their error in the direction.
 fn proven(
     constraints: &[Constraint],
     basis: [usize; 3],

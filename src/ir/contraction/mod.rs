@@ -13,10 +13,12 @@
 //! | `linear` | linear forms with known ranges, and the box around them (linear programming) |
 //!
 //! Intervals here hold the *numbers* that a node may be. Where a formula is positive every operand that it
-//! needs is a number, so an undefined operation restricts its operands and does not make the whole unknown.
+//! needs is a number, so an undefined operation restricts its operands and does not make the whole formula
+//! unknown.
 //!
-//! Invariant: what is cut off holds no point at which the formula is positive, over the reals or as programs
-//! in `f64` evaluate it. Rules backwards therefore widen a value by the rounding error of its operation first.
+//! Invariant: the parts that are cut off hold no point at which the formula is positive, over the reals or as
+//! programs in `f64` evaluate it. Backward rules therefore first widen a value by the rounding error of its
+//! operation.
 
 mod backward;
 mod contractor;

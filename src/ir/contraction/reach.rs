@@ -13,20 +13,20 @@ use crate::ir::derived::sign::SignRule;
 use crate::ir::graph::{Expr, Graph, Node};
 use crate::ir::op::Binary;
 
-/// Half the side of the cube that is looked at.
+/// Half the side of the cube that is searched.
 const FARTHEST: f64 = 1e60;
 
-/// A box that reaches farther has no end that is of use.
+/// A box that reaches farther counts as having no end.
 const OF_USE: f64 = 1e12;
 
-/// Formulas with more nodes are not looked at.
+/// Formulas with more nodes are skipped.
 const MOST_NODES: usize = 20_000;
 
 /// Rounds of contraction for each junction.
 const ROUNDS: usize = 6;
 
-/// A box around the points at which a root is positive at any time. `None` if no end was found on some side, or
-/// if there are no such points.
+/// A box around the points at which a root is positive at any time. `None` if no end was found on some side,
+/// or if there are no such points.
 pub fn reach(graph: &Graph, root: Node) -> Option<Aabb> {
     let (graph, root) = folded(graph, root);
     if graph.len() > MOST_NODES {
@@ -38,7 +38,8 @@ pub fn reach(graph: &Graph, root: Node) -> Option<Aabb> {
     (!found.is_empty() && ends < OF_USE).then_some(found)
 }
 
-/// The graph of a root alone, with the values of what uses no coordinate: rules look for numbers.
+/// The graph of a root alone, with parts that use no coordinate replaced by their values, because rules look
+/// for numbers.
 fn folded(graph: &Graph, root: Node) -> (Graph, Node) {
     let mut out = Graph::like(graph);
     let mut image: FxHashMap<Node, Node> = FxHashMap::default();
@@ -69,7 +70,8 @@ struct Junctions<'g> {
     known: FxHashMap<(Node, bool, u64), Aabb>,
 }
 
-/// For u ∨ v > −c one of u and v is above −c times this: u ∨ v is at most (2 − √2)·max(u, v) where both are negative.
+/// If u ∨ v > −c, one of u and v is above −c times this, because u ∨ v is at most (2 − √2)·max(u, v) where
+/// both are negative.
 const SHARE: f64 = 1.71;
 
 impl Junctions<'_> {
@@ -105,7 +107,7 @@ impl Junctions<'_> {
         found
     }
 
-    /// A node that is another one and a number.
+    /// A node that is the sum of another node and a number.
     fn shifted(&self, node: Node) -> Option<(Node, f64)> {
         let number = |node| self.graph.as_constant(node);
         match self.graph.expr(node) {
@@ -135,7 +137,7 @@ impl Junctions<'_> {
                 Contracted::Nowhere => return Aabb::EMPTY,
                 Contracted::Everywhere => return space,
                 Contracted::Somewhere if !contract_linear(&forms, &mut space) => return Aabb::EMPTY,
-                // what one round finds of a form helps the next one with the others
+                // the range that one round finds for a form helps the next round with the others
                 Contracted::Somewhere => given = forms,
             }
         }

@@ -1,4 +1,4 @@
-//! How the nodes of a graph are read.
+//! The rules by which the nodes of a graph are computed.
 
 use crate::interval::Interval;
 use crate::ir::bounds::range::{Affine, RangeRule};
@@ -6,7 +6,7 @@ use crate::ir::function::BinaryFunction;
 use crate::ir::graph::{Axis, Expr, Graph, Node};
 use crate::ir::op::{Binary, Unary};
 
-/// How a node is computed from others.
+/// The rule by which a node is computed from others.
 #[derive(Debug, Clone, Copy)]
 pub enum Rule {
     /// By its operation.
@@ -17,14 +17,14 @@ pub enum Rule {
     Slab { of: Node, first: Affine, second: Affine },
 }
 
-/// What a node is in terms of the coordinates of space.
+/// The degree of a node in the coordinates of space.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Degree {
     /// It does not depend on them.
     Number,
     /// A linear form of them.
     Linear,
-    /// Neither is known of it.
+    /// Neither is known.
     Other,
 }
 
@@ -59,8 +59,8 @@ impl Rule {
         expr.into_iter().flat_map(Expr::operands).chain(of)
     }
 
-    /// The operands without which it is not a number. The others may be undefined at a point where it has a
-    /// value: 1^y is 1 even if y is not a number.
+    /// The operands that must be numbers for it to be one. The others may be undefined at a point where it
+    /// has a value: 1^y is 1 even if y is not a number.
     pub fn needed(self, graph: &Graph) -> impl Iterator<Item = Node> {
         let never = |node: Node, number: f64| graph.as_constant(node).is_some_and(|c| c != number);
         let (needs_first, needs_second) = match self {
@@ -89,8 +89,8 @@ impl Rule {
         self.operands().zip(is_needed).filter_map(|(node, needed)| needed.then_some(node))
     }
 
-    /// Whether a node with this rule may be infinite where its operands are numbers, if nothing bounds its range:
-    /// an operand is, or bounded operands overflow, or it has a pole.
+    /// Whether a node with this rule may be infinite where its operands are numbers, if its range is not
+    /// bounded: an operand is infinite, bounded operands overflow, or it has a pole.
     pub fn may_be_infinite(self, of: impl Fn(Node) -> Interval, infinite: impl Fn(Node) -> bool) -> bool {
         let has_pole = match self {
             Self::Plain(Expr::Unary(Unary::Call(function), _)) => function.has_pole(),
@@ -102,7 +102,8 @@ impl Rule {
         has_pole || self.operands().any(infinite) || !is_read && !self.operands().any(is_unbounded)
     }
 
-    /// Whether it is undefined where one of its operands is infinite: ∞ − ∞, also within R₀, 0·∞, ∞/∞ or the sine of ∞.
+    /// Whether it is undefined where one of its operands is infinite: ∞ − ∞, also within R₀, 0·∞, ∞/∞ or the
+    /// sine of ∞.
     pub fn fails_at_infinity(self, of: impl Fn(Node) -> Interval, infinite: impl Fn(Node) -> bool) -> bool {
         match self {
             Self::Plain(Expr::Binary(op, a, b)) => match op {

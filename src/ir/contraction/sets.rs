@@ -1,15 +1,15 @@
-//! Intervals as sets of numbers, and what is known of a box.
+//! Intervals as sets of numbers, and the possible results for a box.
 
 use crate::interval::Interval;
 
-/// What is known of a box.
+/// The result of contraction for a box.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Contracted {
     /// The formula is positive nowhere in it.
     Nowhere,
     /// The formula is positive everywhere in it.
     Everywhere,
-    /// It may be positive somewhere in what is left.
+    /// It may be positive somewhere in the remaining part.
     Somewhere,
 }
 
@@ -19,7 +19,7 @@ pub fn meet(a: Interval, b: Interval) -> Option<Interval> {
     (lo <= hi).then_some(Interval { lo, hi })
 }
 
-/// The hull of what an interval shares with two others.
+/// The hull of the intersections of an interval with two others.
 pub fn meet_either(a: Interval, [b, c]: [Interval; 2]) -> Option<Interval> {
     match (meet(a, b), meet(a, c)) {
         (Some(b), Some(c)) => Some(b.hull(c)),

@@ -1,8 +1,8 @@
-//! Derivatives over a box, and what they exclude.
+//! Contraction of a box by derivatives.
 //!
-//! For every point p of a box, u(p) ∈ u(c) + G·(p − c), with c its centre and G an enclosure of the
-//! (generalised) gradient over the box: the mean value theorem. What it excludes shrinks with the square of
-//! the box, where values alone are wrong by its size.
+//! By the mean value theorem, u(p) ∈ u(c) + G·(p − c) for every point p of a box, where c is its centre and G
+//! an enclosure of the (generalised) gradient over the box. The error of this shrinks with the square of the
+//! box's size, that of values alone with its size.
 
 use glam::DVec3;
 
@@ -30,8 +30,8 @@ const TWO: Interval = Interval::point(2.0);
 type Slopes = [Interval; 3];
 
 impl Contractor {
-    /// Cuts off what the formula's derivatives exclude. It pays in boxes that are small on the scale of the
-    /// formula. `forms` receives what they say about the distance from an origin.
+    /// Cuts off the parts that the formula's derivatives exclude. This pays in boxes that are small on the
+    /// scale of the formula. `forms` receives the linear forms in the distance from an origin that follow.
     pub fn contract_by_slopes(
         &self,
         wanted: &Wanted<'_>,
@@ -46,7 +46,8 @@ impl Contractor {
 }
 
 impl Contractor {
-    /// Enclosures of the (generalised) derivatives over a region. `None` if the formula may be undefined there.
+    /// Enclosures of the (generalised) derivatives over a region. `None` if the formula may be undefined
+    /// there.
     pub fn slopes(&self, region: &Region<'_>) -> Option<[Interval; 3]> {
         SCRATCH.with_borrow_mut(|scratch| {
             scratch.known.clear();
@@ -60,8 +61,8 @@ impl Contractor {
     }
 }
 
-/// Cuts off what the derivatives exclude. `forms` receives what they say about p − `origin`, so that several
-/// formulas can be solved together.
+/// Cuts off the parts that the derivatives exclude. `forms` receives the linear forms in p − `origin` that
+/// follow, so that several formulas can be solved together.
 fn contract(
     contractor: &Contractor,
     wanted: &Wanted<'_>,
@@ -76,7 +77,7 @@ fn contract(
         contractor.forward(&Region { space: over, ..wanted.region }, scratch)?;
         (!scratch.may_fail[root]).then(|| scratch.values[root])
     };
-    // where the formula may be undefined there is no gradient to speak of
+    // where the formula may be undefined it has no gradient
     let Some(at_centre) = value(scratch, &point) else { return Contracted::Somewhere };
     if value(scratch, space).is_none() {
         return Contracted::Somewhere;
@@ -95,7 +96,7 @@ fn contract(
     verdict
 }
 
-/// What is left of a box where `most` + slopes·(p − centre) may be positive.
+/// The remaining part of a box, where `most` + slopes·(p − centre) may be positive.
 fn solve(most: f64, slopes: Slopes, centre: DVec3, space: &mut Aabb) -> Contracted {
     let offset = |space: &Aabb, axis: usize| Interval {
         lo: (space.min[axis] - centre[axis]).next_down(),
@@ -112,7 +113,7 @@ fn solve(most: f64, slopes: Slopes, centre: DVec3, space: &mut Aabb) -> Contract
         let Some(left) = backward::factor(needed, slopes[axis], offset(space, axis)) else {
             return Contracted::Nowhere;
         };
-        // programs round a formula, and so move its surface a little
+        // programs round a formula, which moves its surface a little
         let slack =
             SURFACE_ROUNDING * (space.min[axis].abs().max(space.max[axis].abs()) + space.size()[axis]);
         let kept = Interval { lo: centre[axis] + left.lo - slack, hi: centre[axis] + left.hi + slack };
@@ -249,7 +250,7 @@ fn slopes_of_weight(u: Interval, v: Interval) -> Option<[Interval; 2]> {
     (cubes.lo > f64::MIN_POSITIVE).then(|| [-v.square() / cubes, u * v / cubes])
 }
 
-/// A factor times slopes. What does not vary has no slope, however steep the function of it.
+/// A factor times slopes. Where the argument is constant the slope is zero, however steep the function.
 fn scaled(factor: Interval, slopes: Slopes) -> Slopes {
     slopes.map(|slope| if slope == ZERO { ZERO } else { factor * slope })
 }
