@@ -33,7 +33,7 @@ pub enum Shape {
 /// A request for compilation.
 #[derive(Debug, Clone, Copy)]
 pub struct Request<'a> {
-    /// The graph; only what the outputs need of it is computed.
+    /// The graph. Only the nodes that the outputs need are computed.
     pub graph: &'a Graph,
     /// Nodes that a batch program reads from columns instead of computing them; other shapes have none.
     pub inputs: &'a [Node],

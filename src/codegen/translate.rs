@@ -71,7 +71,7 @@ fn build(request: Request<'_>, listing: bool) -> Result<(Code, Listing), Codegen
     Ok((code, listing))
 }
 
-/// How a function stands in its module.
+/// The declaration of a function in its module.
 #[derive(Clone, Copy)]
 pub(super) struct Named<'a> {
     pub name: &'a str,

@@ -39,7 +39,7 @@ pub struct Apng<W: Write> {
 }
 
 impl<W: Write> Apng<W> {
-    /// Begins a film of the given number of pictures, which repeats for ever. `size` is the width and the
+    /// Begins a film of the given number of pictures, which repeats endlessly. `size` is the width and the
     /// height in pixels, `rate` the number of pictures in a second.
     ///
     /// # Errors

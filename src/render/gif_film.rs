@@ -131,7 +131,7 @@ fn nearest(colours: &[Rgb], colour: Rgb) -> u8 {
     found.map_or(0, |(k, _)| k as u8)
 }
 
-/// An animated GIF that repeats for ever.
+/// An animated GIF that repeats endlessly.
 pub struct Gif<W: Write> {
     encoder: gif::Encoder<W>,
     palette: Palette,

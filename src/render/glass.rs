@@ -1,4 +1,4 @@
-//! Clear things: obstacles of glass and the surface of the fluid, blended over what is seen through them.
+//! Clear things: obstacles of glass and the surface of the fluid, blended over the things seen through them.
 //!
 //! A pixel keeps the nearest and the farthest of the clear triangles that its ray meets: the front and the
 //! back of a thing. Triangles between them, such as the inner sides of a thick wall, would only darken the

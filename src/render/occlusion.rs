@@ -164,7 +164,7 @@ mod tests {
         light
     }
 
-    /// How much darker a picture is at (x, y), both in metres.
+    /// The darkening of a picture at (x, y), both in metres.
     fn dark(light: &[f32], x: f64, y: f64) -> f64 {
         let at = |v: f64| (v * PIXELS + 0.5 * WIDTH as f64) as usize;
         1.0 - f64::from(light[at(y) * WIDTH + at(x)])

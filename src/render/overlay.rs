@@ -12,7 +12,7 @@ use super::{ColourMap, RenderError, Rgb, image::Layer};
 pub struct Legend<'a> {
     /// The title over the picture.
     pub title: &'a str,
-    /// What the colour bar shows; `None` draws no bar.
+    /// The scale of the colour bar; `None` draws no bar.
     pub scale: Option<Scale<'a>>,
 }
 

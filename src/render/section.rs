@@ -30,7 +30,7 @@ impl SeenCut {
         camera.nearness_of(cut).map(|nearness| Self { nearness, colour })
     }
 
-    /// Draws what the cut leaves of a mesh, and the face that it opens.
+    /// Draws the remaining part of a cut mesh, and the face that the cut opens.
     pub fn draw(&self, facets: &[&Facet], ink: impl Fn(&Facet, [f32; 3]) -> Rgb, band: &mut Band<'_>) {
         let mut left = vec![0.0_f32; band.nearness.len()];
         let mut colour = vec![[0; 3]; band.nearness.len()];

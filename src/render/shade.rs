@@ -7,7 +7,7 @@ use super::Rgb;
 /// The material of a mesh.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Material {
-    /// A warm grey that hides what is behind it: obstacles.
+    /// An opaque warm grey: obstacles.
     #[default]
     Stone,
     /// An obstacle through which the fluid is seen.

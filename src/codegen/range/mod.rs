@@ -47,7 +47,7 @@ const MARGIN: f64 = 8.0 * ULP;
 const R0_MARGIN: f64 = 16.0 * ULP;
 
 /// Absolute widening of R₀, because operands below 2⁻⁵⁰⁰ may have squares that underflow. It is more than
-/// their result, and more than the root of what is lost.
+/// their result, and more than the root of the lost part.
 const R0_UNDERFLOW: f64 = 1e-147;
 
 /// Sums of squares may reach this far below zero in [`Rounding::Nearest`].

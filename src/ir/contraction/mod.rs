@@ -1,11 +1,11 @@
 //! Contraction: a box made smaller without losing a point at which a formula is positive.
 //!
-//! | file | what it holds |
+//! | file | content |
 //! |---|---|
 //! | `rule` | how the nodes of a graph are read: powers and slabs are one operation |
 //! | `forward` | the numbers that an operation may give |
 //! | `backward` | the operands that may give a number |
-//! | `sets` | intervals as sets of numbers, and what is known of a box |
+//! | `sets` | intervals as sets of numbers, and the possible results for a box |
 //! | `contractor` | both, over all nodes of a graph |
 //! | `forms` | the linear forms in a graph |
 //! | `hull` | a box made smaller by values (hull consistency) |

@@ -20,7 +20,7 @@ use crate::ir::graph::{Axis, Expr, Node};
 use crate::ir::lookup::{Part, Tables};
 use crate::ir::op::{Binary, Unary};
 
-/// How far rounding may move a surface, relative to the coordinates of its points.
+/// Largest motion of a surface by rounding, relative to the coordinates of its points.
 pub const SURFACE_ROUNDING: f64 = 1e-13;
 
 const ZERO: Interval = Interval::point(0.0);

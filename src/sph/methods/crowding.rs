@@ -7,8 +7,8 @@ use crate::sph::kernel::Wendland;
 use crate::sph::pairs::Real;
 use crate::sph::params::Parameters;
 
-/// Sums Σ V ∇W, 1/m, without what walls add to it. With V∇W = −V·c·(1 − q)³·**r** the pairs sum
-/// (1 − q)³·**r**, and the factor comes last.
+/// Sums Σ V ∇W, 1/m, without the part of walls. With V∇W = −V·c·(1 − q)³·**r** the pairs sum (1 − q)³·**r**,
+/// and the factor comes last.
 #[derive(Clone, Copy)]
 pub(super) struct Crowding {
     pub kernel: Wendland,

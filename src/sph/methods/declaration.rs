@@ -1,4 +1,4 @@
-//! The declaration of a method of the solver: its keys, defaults and passes, and what it saves.
+//! The declaration of a method of the solver: its keys, defaults, passes and saved columns.
 //!
 //! The reader of scenes, `rfm explain`, the checks of parameters and the tables of the manual all read these
 //! declarations. No other place describes a single method.
@@ -36,14 +36,14 @@ pub struct Key<M: 'static> {
     pub block: KeyBlock,
     /// Its meaning, in one line.
     pub about: &'static str,
-    /// What it may hold, and which number that sets.
+    /// The values that it may hold, and the number that they set.
     pub value: Value<M>,
 }
 
-/// States what a word of a key means in the numbers of a method.
+/// Sets the numbers of a method for a word of a key.
 pub type Setter<M> = fn(&mut M);
 
-/// What a key may hold.
+/// The values that a key may hold.
 pub enum Value<M: 'static> {
     /// A number with a unit.
     Number {
@@ -268,7 +268,7 @@ pub struct KeyInfo {
     pub about: &'static str,
     /// Its unit; `None` for plain numbers and words.
     pub unit: Option<&'static str>,
-    /// What it accepts: the range of a number, or the words.
+    /// The values that it accepts: the range of a number, or the words.
     pub accepts: String,
     /// Its value if it is not stated.
     pub default: String,

@@ -1,4 +1,4 @@
-//! What happens to a pressure below zero.
+//! The treatment of pressures below zero.
 
 /// The pressure of an equation of state where the density is below the rest density.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]

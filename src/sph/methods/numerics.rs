@@ -41,7 +41,7 @@ pub(in crate::sph) trait Numerics: Sync {
         None
     }
 
-    /// Checks what the bounds of single keys do not cover.
+    /// Checks conditions that the bounds of single keys do not cover.
     ///
     /// # Errors
     /// The first parameter that is out of range.
@@ -63,10 +63,10 @@ pub(in crate::sph) trait Numerics: Sync {
     ///
     /// Forces along lines resist a compression three times as strongly as a shear. Away from walls, flows
     /// burst with steps beyond 1.2 times (h/2)²/24ν (support of 2.4 spacings), or 1.5 times (3 spacings). A
-    /// wall adds up to 2ν·18/h²/(1 − m) to the rate of a particle beside it, and divides what its neighbours
-    /// add by 1 − m: by a half at a wall and by a quarter in an edge, where there are fewer neighbours.
-    /// Together they allow 0.57 of (h/2)²/24ν; in tests flows burst beyond 0.8 of it in a box, and 0.7 in a
-    /// cylinder.
+    /// wall adds up to 2ν·18/h²/(1 − m) to the rate of a particle beside it, and divides the part of its
+    /// neighbours by 1 − m: by a half at a wall and by a quarter in an edge, where there are fewer
+    /// neighbours. Together they allow 0.57 of (h/2)²/24ν; in tests flows burst beyond 0.8 of it in a box,
+    /// and 0.7 in a cylinder.
     fn viscous_dt(&self, scales: &Scales) -> f64 {
         let part = if scales.sticks { 48.0 } else { 24.0 };
         (0.5 * scales.support_radius).powi(2) * scales.rest_density / (part * scales.viscosity)

@@ -11,7 +11,7 @@ pub(super) trait Start {
     fn start(self, core: &mut Core, is_new: bool) -> Box<dyn Scheme>;
 }
 
-/// A method at work, with what it keeps between steps.
+/// A method at work, with the state that it keeps between steps.
 pub(in crate::sph) trait Scheme: Send + Sync {
     /// Advances by one step of at most `longest` seconds, and returns how long it was.
     ///
@@ -19,10 +19,11 @@ pub(in crate::sph) trait Scheme: Send + Sync {
     /// [`StepError`] if a value became infinite or NaN, or steps became too short.
     fn step(&mut self, core: &mut Core, longest: f64) -> Result<f64, StepError>;
 
-    /// Puts into a checkpoint what the next step needs besides the particles and their accelerations.
+    /// Puts into a checkpoint the state that the next step needs besides the particles and their
+    /// accelerations.
     fn save(&self, _checkpoint: &mut Checkpoint) {}
 
-    /// Restores from a checkpoint what [`Scheme::save`] put there.
+    /// Restores from a checkpoint the state that [`Scheme::save`] put there.
     ///
     /// # Errors
     /// The column that the checkpoint lacks.

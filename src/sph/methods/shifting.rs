@@ -4,8 +4,8 @@
 //! Forces by sums of pressures p_i + p_j push particles apart until they lie evenly, but the noise of this is
 //! proportional to the pressure. Forces by differences p_j − p_i have no such noise, and make no such order.
 //! So particles also drift by −2h·U·(Σ V ∇W + ∇λ), where U is the greatest speed, from where they crowd to
-//! where there are few. The drift is not a motion of the fluid. A particle keeps what it carries (velocity,
-//! density); the error of that is of the order of the drift times the gradient.
+//! where there are few. The drift is not a motion of the fluid. A particle keeps its velocity and density,
+//! with an error of the order of the drift times their gradient.
 //!
 //! A compressed fluid has more particles where its pressure is higher, and they do not crowd there. With
 //! `wcsph` the sum is therefore Σ V(1 − (ρ_j − ρ₀)/ρ₀)∇W, with the densities that particles carry. (Otherwise
@@ -23,8 +23,8 @@ use crate::sph::{
     particles::Vectors,
 };
 
-/// Limits of G = −⅓ Σ V r·∇W + ⅓ tr K. Below the first a particle belongs to the surface, from the second on
-/// to the depth.
+/// Limits of G = −⅓ Σ V r·∇W + ⅓ tr K. Below the first a particle belongs to the surface, above the second to
+/// the depth.
 const SURFACE: [f64; 2] = [0.85, 0.95];
 
 /// The rate, over U/h, at which densities return to those of the particles' places. A wave's volume strays by

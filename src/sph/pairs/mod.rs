@@ -7,8 +7,8 @@
 //! ([`Near`]).
 //!
 //! ```text
-//! Columns::sort ─▶ blocks ─▶ gather what is around a block ─▶ registers of particles ─▶ what is near each
-//!                                                             ─▶ PairPass::add ─▶ PairPass::finish
+//! Columns::sort ─▶ blocks ─▶ gather the surroundings of a block ─▶ registers of particles ─▶ near particles
+//!                                                               ─▶ PairPass::add ─▶ PairPass::finish
 //! ```
 //!
 //! Positions are taken relative to the block before they are rounded to the precision of the pair arithmetic.

@@ -48,8 +48,9 @@ pub struct Dfsph {
     /// α of the artificial viscosity (Monaghan 1992), for a speed of sound of ten times the greatest expected
     /// speed. Default 0.06; zero: the term is not computed.
     pub artificial_viscosity: f64,
-    /// How strongly particles drift to where there are fewer of them. Default 0: no drift. A strength of 1
-    /// halves the deviation of a fluid at rest, and makes that of a shear flow two to three times as large.
+    /// Strength of the drift of particles to where there are fewer of them. Default 0: no drift. A strength
+    /// of 1 halves the deviation of a fluid at rest, and makes that of a shear flow two to three times as
+    /// large.
     pub shifting: f64,
 }
 

@@ -52,7 +52,7 @@ impl Constants {
 /// Squares of distances below this part of h² do not count as a direction.
 const LEAST_DISTANCE: f64 = 1e-6;
 
-/// How a linear system takes walls into account.
+/// The treatment of walls in a linear system.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Continuation {
     /// A pressure that is linear in space continues behind the wall, and a velocity is mirrored there, by λ

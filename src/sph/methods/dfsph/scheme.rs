@@ -13,7 +13,7 @@
 //! solver changes places, and the displacement is not part of the velocity.
 //!
 //! But then an error left by an unfinished solve no longer appears in the density, and the pressure cannot
-//! correct it. A column could sink for ever within the tolerance while displacements lift it (a breaking dam
+//! correct it. A column could sink endlessly within the tolerance while displacements lift it (a breaking dam
 //! gained 8 % of its energy in this way). So each particle remembers the error as a debt D of density, and
 //! the pressure pays it back within τ (Baumgarte 1972). The tolerance of this solve is that of the density
 //! over τ. A part of the density that displacements take away is added to the debt, see [`OWED`].

@@ -10,16 +10,16 @@ use crate::sph::{
     walls::{Carried, Coverage, WallDrag},
 };
 
-/// What walls take of the kernels of the particles near them.
+/// The parts that walls take of the kernels of the particles near them.
 #[derive(Default)]
 pub(super) struct Walls {
     /// Index into `found` of each particle; [`NONE`] if no wall is near.
     place: Vec<u32>,
-    /// For each particle near walls: its index, what walls take of its kernel, and M = (1 − K)⁻¹.
+    /// For each particle near walls: its index, the part that walls take of its kernel, and M = (1 − K)⁻¹.
     found: Vec<(u32, WallsNear, DMat3)>,
 }
 
-/// What walls take of the kernel of one particle.
+/// The part that walls take of the kernel of one particle.
 pub(super) type WallsNear = Coverage<WallDrag, Carried>;
 
 /// Index of a particle that has no wall near it.
@@ -46,7 +46,7 @@ impl Walls {
         }
     }
 
-    /// What walls take of a particle's kernel, and its M; `None` if no wall is near.
+    /// The part that walls take of a particle's kernel, and its M; `None` if no wall is near.
     #[inline]
     pub fn near(&self, i: usize) -> Option<(&WallsNear, &DMat3)> {
         let place = self.place[i];
@@ -75,7 +75,7 @@ impl Walls {
         }
     }
 
-    /// The particles near walls: the index of each, what walls take of its kernel, and its M.
+    /// The particles near walls: the index of each, the part that walls take of its kernel, and its M.
     pub fn found(&self) -> &[(u32, WallsNear, DMat3)] {
         &self.found
     }

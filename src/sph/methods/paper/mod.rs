@@ -22,7 +22,7 @@ pub struct Paper {
     pub stiffness: f64,
     /// Threshold l on |∇c|, 1/m, above which a particle counts as surface. 7.065 (table 1) = √(ρ₀/20 kg/m³).
     pub surface_threshold: f64,
-    /// What happens to a negative pressure. By default it is cut off at zero.
+    /// The treatment of negative pressures. By default they are cut off at zero.
     pub negative_pressure: NegativePressure,
 }
 

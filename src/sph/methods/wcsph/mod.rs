@@ -61,10 +61,10 @@ pub struct Wcsph {
     /// [`Experiment`](crate::experiment::Experiment) finds a viscous fluid that fills all room of its scene,
     /// it chooses differences instead.
     pub gradients: Option<Gradients>,
-    /// How strongly particles drift to where there are fewer of them, which keeps them evenly distributed.
-    /// Zero: no drift. `None`: 1 with differences of pressure, 0 with sums.
+    /// Strength of the drift of particles to where there are fewer of them, which keeps them evenly
+    /// distributed. Zero: no drift. `None`: 1 with differences of pressure, 0 with sums.
     pub shifting: Option<f64>,
-    /// What happens to a negative pressure. By default it is cut off at zero.
+    /// The treatment of negative pressures. By default they are cut off at zero.
     pub negative_pressure: NegativePressure,
     /// Whether the fluid starts under the pressure of its own weight. If not, it starts without pressure, and
     /// oscillates.

@@ -54,7 +54,7 @@ fn held(filled: f64) -> f64 {
     ((filled - spray) / (surface - spray)).clamp(0.0, 1.0)
 }
 
-/// What the pass over pairs needs besides the columns that it sums.
+/// The data of the pass over pairs besides the columns that it sums.
 #[derive(Clone, Copy)]
 pub(super) struct Rates<'a> {
     numbers: &'a Numbers,
@@ -156,7 +156,7 @@ impl<const LAMINAR: bool, const ARTIFICIAL: bool, const EVEN: bool> Pairs<'_, LA
         let rates = &self.0;
         let s = rates.kernel.nearness(r2);
         let f = s * s * s;
-        // how fast they part, by the velocities from column `k` on
+        // how fast they part, by the three velocity columns from `k`
         let parting = |k: usize| {
             let x = (own[k] - other[k]) * d[0];
             let x = (own[k + 1] - other[k + 1]).mul_add(d[1], x);

@@ -3,7 +3,7 @@
 //!
 //! ```text
 //! ρ_i = Q_i + o_i,  Q_i = Σ m W + 2ρ₀ λ,
-//! do_i/dt = δ·h·c Σ 2(ρ_j − ρ_i − ρᴴ_ji) V r_ji·∇W/r² + (what places say)
+//! do_i/dt = δ·h·c Σ 2(ρ_j − ρ_i − ρᴴ_ji) V r_ji·∇W/r² + (return to the density of the places)
 //! a_i = g − 1/ρ₀·[Σ V (p_i + p_j) ∇W + 2 p_i ∇λ] + viscosity
 //! p = c²ρ₀/7·((ρ/ρ₀)⁷ − 1)
 //! ```
@@ -19,7 +19,7 @@
 //!
 //! A density that started at a surface is no longer right once its particle is deep in the fluid, and
 //! diffusion mixes such densities. In the fluid they therefore return to the density of the places: Σ m W
-//! over its value on a lattice, plus the part of the walls and what is missing before a free surface
+//! over its value on a lattice, plus the part of the walls and the part missing before a free surface
 //! ([`free_surface`](super::super::free_surface)). Where there is room they return to within two hundredths,
 //! and not slower than a fluid falls together.
 //!
@@ -34,12 +34,12 @@
 //! divided by the gradient of a position by the same sum: the tensor −Σ V r⊗∇W over a particle's neighbours
 //! (Bonet & Lok 1999). So the gradient of a pressure that is linear in space is exact, however far above zero
 //! the pressure lies and wherever the neighbours are, even at walls, where half of them are missing. (Closed
-//! forms of what walls take hold for whole walls, but not for the places of particles: with them still water
-//! would move along edges and out of corners for ever, at 4 cm/s and more.) Such forces do not push particles
-//! apart; shifting keeps the particles evenly distributed instead ([`super::super::shifting`]). At a free
-//! surface and in spray G = −⅓ Σ V r·∇W + ⅓ tr K is small (it is 0.98 on a lattice at h = 2.6 spacings), and
-//! there pressures act as sums p_i + p_j with this key, too. Densities then follow the equation of
-//! continuity, and neither energy nor momentum is conserved by construction.
+//! forms of the part that walls take hold for whole walls, but not for the places of particles: with them
+//! still water would never stop moving along edges and out of corners, at 4 cm/s and more.) Such forces do
+//! not push particles apart; shifting keeps the particles evenly distributed instead
+//! ([`super::super::shifting`]). At a free surface and in spray G = −⅓ Σ V r·∇W + ⅓ tr K is small (it is 0.98
+//! on a lattice at h = 2.6 spacings), and there pressures act as sums p_i + p_j with this key, too. Densities
+//! then follow the equation of continuity, and neither energy nor momentum is conserved by construction.
 //!
 //! Walls enter by λ, ∇λ and K in closed form ([`Coverage`](crate::sph::walls::Coverage)). They mirror the
 //! pressure and the velocity of a particle. In the depth of the fluid the pressure beyond a wall is also
