@@ -4,7 +4,7 @@
 //! ```text
 //! v ← v + dt·(g + viscosity)
 //! v ← v + dt·a(s)          s ≥ 0 so that dρ/dt ≤ −D/τ, or ≤ (ρ₀ − ρ)/τ where ρ < ρ₀
-//! D ← D + dt·(what of dρ/dt the solver left)
+//! D ← D + dt·(the part of dρ/dt that the solver left)
 //! x ← x + dt·v + b(s′)     s′ ≥ 0 so that ρ ≤ ρ₀ at the new place
 //! ```
 //!
