@@ -154,6 +154,7 @@ macro_rules! declare_keys {
     ) => {
         $(#[$meta])*
         pub(in crate::lower) mod $module {
+            // no block has keys of every kind
             #[allow(unused_imports)]
             use crate::lower::scene::declaration::{
                 KeyValue::{Block, Count, Formulas, Measured, MethodName, Number, Other, Vector, Words},
