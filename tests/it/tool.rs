@@ -101,3 +101,10 @@ pub fn simulation(text: &str) -> rfm::sph::Simulation {
         rfm::Experiment::new(&program, &scene.name, rfm::Engine::Auto).unwrap_or_else(|e| panic!("{e}"));
     experiment.start().unwrap_or_else(|e| panic!("{e}")).simulation
 }
+
+/// Runs a simulation until this time, s.
+pub fn run_to(simulation: &mut rfm::sph::Simulation, time: f64) {
+    while simulation.time() < time {
+        simulation.step().unwrap_or_else(|e| panic!("{e}"));
+    }
+}

@@ -3,13 +3,7 @@
 use rfm::glam::DVec3;
 use rfm::sph::Simulation;
 
-use crate::tool::simulation;
-
-fn run_to(simulation: &mut Simulation, time: f64) {
-    while simulation.time() < time {
-        simulation.step().unwrap_or_else(|e| panic!("{e}"));
-    }
-}
+use crate::tool::{run_to, simulation};
 
 fn middle(simulation: &Simulation) -> DVec3 {
     let places = &simulation.particles().position;

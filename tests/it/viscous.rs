@@ -3,13 +3,7 @@
 use rfm::glam::DVec3;
 use rfm::sph::{Gradients, Method, Simulation};
 
-use crate::tool::simulation;
-
-fn run_to(simulation: &mut Simulation, time: f64) {
-    while simulation.time() < time {
-        simulation.step().unwrap_or_else(|e| panic!("{e}"));
-    }
-}
+use crate::tool::{run_to, simulation};
 
 /// A channel between two cylinders, five spacings wide, that a force F/r drives: Poiseuille flow that closes on
 /// itself (Dean 1928), as in `examples/validation/poiseuille.rfm`, without any key of the method.
