@@ -90,12 +90,13 @@ impl Experiment {
         let by_walls = bodies::greatest_speed(&program, &scene, &parts);
         let typical_speed = parameters::typical_speed(&program, &scene).max(by_walls);
         let mass = filling::mass_by_number(&scene, &fluid).unwrap_or(scene.fluid.mass);
-        let scales = parameters::of_scene(&program, &scene, mass, typical_speed).scales();
+        let mut parameters = parameters::of_scene(&program, &scene, mass, typical_speed);
         let mut method = scene.method;
         let has_surface = || room::has_surface(&scene, &fluid, parts.iter().map(|part| &part.whole));
-        method.settle(&scales, &has_surface);
+        method.settle(&parameters.scales(), &has_surface);
         let scene = Scene { method, ..scene };
-        let mut parameters = parameters::of_scene(&program, &scene, mass, typical_speed);
+        parameters.method = method;
+        parameters.support_radius = parameters::support_radius(&scene, mass);
         let (time_step, too_long) = parameters::time_step(&scene, &parameters);
         parameters.time_step = time_step.seconds;
         let (h, spacing) = (parameters.support_radius, parameters.spacing());

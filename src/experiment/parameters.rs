@@ -42,14 +42,10 @@ pub(super) fn typical_speed(program: &Program, scene: &Scene) -> f64 {
 /// All parameters except the time step, which is 1 s here. `mass` is that of a particle, kg.
 pub(super) fn of_scene(program: &Program, scene: &Scene, mass: f64, typical_speed: f64) -> Parameters {
     let (fluid, method) = (&scene.fluid, scene.method.fluid());
-    // a length that is stated for the usual particles scales with the size of particles
-    let (stated, derived) = ((fluid.mass / fluid.density).cbrt(), (mass / fluid.density).cbrt());
-    let support = scene.method.support(fluid.surface_tension > 0.0);
-    let usual = support.radius(stated) * (derived / stated);
     Parameters {
         rest_density: fluid.density,
         particle_mass: mass,
-        support_radius: fluid.support_radius.unwrap_or(usual),
+        support_radius: support_radius(scene, mass),
         viscosity: fluid.viscosity,
         surface_tension: fluid.surface_tension,
         gravity: at_start(program, &scene.gravity),
@@ -74,6 +70,15 @@ pub(super) fn of_scene(program: &Program, scene: &Scene, mass: f64, typical_spee
         fills_vessel: false,
         precision: scene.solver.precision.unwrap_or(method.precision),
     }
+}
+
+/// The support radius, m, of particles with this mass, kg.
+pub(super) fn support_radius(scene: &Scene, mass: f64) -> f64 {
+    let fluid = &scene.fluid;
+    // a length that is stated for the usual particles scales with the size of particles
+    let (stated, derived) = ((fluid.mass / fluid.density).cbrt(), (mass / fluid.density).cbrt());
+    let support = scene.method.support(fluid.surface_tension > 0.0);
+    fluid.support_radius.unwrap_or(support.radius(stated) * (derived / stated))
 }
 
 /// Speed, rms, that a drop at rest keeps in a method that keeps its density, over √(σ/ρa) with the spacing a,
