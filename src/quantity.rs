@@ -27,6 +27,10 @@ impl Dimension {
     pub const TIME: Self = Self::new(0, 0, 1, 0);
     /// Angle, rad.
     pub const ANGLE: Self = Self::new(0, 0, 0, 1);
+    /// How often in a second.
+    pub const FREQUENCY: Self = Self::new(0, 0, -1, 0);
+    /// An angle in a second.
+    pub const TURN_RATE: Self = Self::new(0, 0, -1, 1);
     /// Speed, m/s.
     pub const SPEED: Self = Self::new(1, 0, -1, 0);
     /// Acceleration, m/s².
@@ -230,7 +234,7 @@ fn base_unit(word: &str) -> Option<Unit> {
         "us" => unit(1e-6, Dimension::TIME),
         "min" => unit(60.0, Dimension::TIME),
         "h" => unit(3600.0, Dimension::TIME),
-        "Hz" => unit(1.0, Dimension::new(0, 0, -1, 0)),
+        "Hz" => unit(1.0, Dimension::FREQUENCY),
         "N" => unit(1.0, Dimension::FORCE),
         "mN" => unit(1e-3, Dimension::FORCE),
         "kN" => unit(1e3, Dimension::FORCE),
@@ -242,7 +246,7 @@ fn base_unit(word: &str) -> Option<Unit> {
         "kJ" => unit(1e3, Dimension::ENERGY),
         "rad" => unit(1.0, Dimension::ANGLE),
         "deg" | "°" => unit(std::f64::consts::PI / 180.0, Dimension::ANGLE),
-        "rpm" => unit(std::f64::consts::PI / 30.0, Dimension::new(0, 0, -1, 1)),
+        "rpm" => unit(std::f64::consts::PI / 30.0, Dimension::TURN_RATE),
         _ => None,
     }
 }

@@ -39,7 +39,9 @@ pub(super) fn check(shared: &Shared, source: Source, files: Files) -> Result<Pro
     let overrides = shared.define.iter().map(|given| (given.name.clone(), given.value)).collect();
     let dimensions =
         shared.define.iter().filter_map(|given| Some((given.name.clone(), given.dimension?))).collect();
-    let options = Options { overrides, dimensions, max_nodes: shared.max_nodes, files, ..Options::default() };
+    let places = shared.places();
+    let max_nodes = shared.max_nodes;
+    let options = Options { overrides, dimensions, places, max_nodes, files, ..Options::default() };
     Program::check(source, options)
 }
 

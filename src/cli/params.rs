@@ -13,36 +13,76 @@ use super::values::{Definition, definition};
 pub(super) fn read(paths: &[PathBuf]) -> Result<Vec<Definition>, Failure> {
     let mut found = Vec::new();
     for path in paths {
-        for (name, value) in table(path)? {
-            found.push(one(path, &name, &value)?);
+        let text = input::read(path)?.text;
+        for (name, value) in table(path, &text)? {
+            found.push(one(&place(path, &text, &name), &name, &value)?);
         }
     }
     Ok(found)
 }
 
-fn table(path: &Path) -> Result<Map<String, Value>, Failure> {
-    let text = input::read(path)?.text;
+fn table(path: &Path, text: &str) -> Result<Map<String, Value>, Failure> {
     let is_json = path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("json"));
     let table = if is_json {
-        serde_json::from_str(&text).map_err(|error| error.to_string())
+        serde_json::from_str(text).map_err(|error| error.to_string())
     } else {
-        toml::from_str(&text).map_err(|error: toml::de::Error| error.message().to_string())
+        toml::from_str(text).map_err(|error: toml::de::Error| match error.span() {
+            Some(span) => format!("line {}: {}", line(text, span.start), error.message()),
+            None => error.message().to_string(),
+        })
     };
     table.map_err(|error| Failure::usage(format!("cannot read the params of `{}`: {error}", path.shown())))
 }
 
-fn one(path: &Path, name: &str, value: &Value) -> Result<Definition, Failure> {
+/// The file and the line in which a name is given its value.
+fn place(path: &Path, text: &str, name: &str) -> String {
+    let is_given = |line: &str| {
+        let bare = line.trim_start_matches([' ', '\t', '{', ',', '"', '\'']);
+        let rest = bare.strip_prefix(name).map(|rest| rest.trim_start_matches([' ', '\t', '"', '\'']));
+        rest.is_some_and(|rest| rest.starts_with(['=', ':']))
+    };
+    // members of an object may share a line, and then that line is the first one
+    match text.lines().position(|line| line.split(',').any(is_given)) {
+        Some(before) => format!("{}:{}", path.shown(), before + 1),
+        None => path.shown(),
+    }
+}
+
+/// The number of the line at a byte.
+fn line(text: &str, byte: usize) -> usize {
+    1 + text.bytes().take(byte).filter(|byte| *byte == b'\n').count()
+}
+
+fn one(place: &str, name: &str, value: &Value) -> Result<Definition, Failure> {
     let text = match value {
         Value::Number(number) => number.to_string(),
         Value::String(text) => text.clone(),
         Value::Null | Value::Bool(_) | Value::Array(_) | Value::Object(_) => {
-            let message = format!(
-                "`{name}` in `{}` is no number: write `{name} = 0.5` or `{name} = \"8 mm\"`",
-                path.shown()
-            );
+            let message =
+                format!("{place}: `{name}` is no number: write `{name} = 0.5` or `{name} = \"8 mm\"`");
             return Err(Failure::usage(message));
         }
     };
-    definition(&format!("{name}={text}"))
-        .map_err(|error| Failure::usage(format!("`{name}` in `{}`: {error}", path.shown())))
+    let given = definition(&format!("{name}={text}"))
+        .map_err(|error| Failure::usage(format!("{place}: `{name}`: {error}")))?;
+    Ok(Definition { place: Some(place.to_string()), ..given })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_line_of_a_param_is_found() {
+        let path = Path::new("sizes.toml");
+        let toml = "# r = 3\nradius = 1\n\"r\" = 2\n  h=\"8 mm\"\n";
+        for (name, expected) in [("radius", 2), ("r", 3), ("h", 4)] {
+            assert_eq!(place(path, toml, name), format!("sizes.toml:{expected}"), "{name}");
+        }
+        let json = "{ \"r\": 1, \"h\": 2,\n  \"w\" : 3 }";
+        for (name, expected) in [("r", 1), ("h", 1), ("w", 2)] {
+            assert_eq!(place(path, json, name), format!("sizes.toml:{expected}"), "{name}");
+        }
+        assert_eq!(place(path, "[a]\nb = 1", "a"), "sizes.toml");
+    }
 }

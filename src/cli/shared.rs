@@ -1,5 +1,6 @@
 //! The options that all commands share.
 
+use std::collections::BTreeMap;
 use std::num::NonZeroUsize;
 use std::path::PathBuf;
 
@@ -30,6 +31,20 @@ pub(super) struct Shared {
     /// What evaluates ω: machine code or the interpreter, which gives the same bits
     #[arg(long, value_enum, default_value_t = Engine::Auto, global = true, hide_short_help = true)]
     pub engine: Engine,
+}
+
+impl Shared {
+    /// Where those params stand that files set, by their names. Of two values for one param the later one counts.
+    pub fn places(&self) -> BTreeMap<String, String> {
+        let mut places = BTreeMap::new();
+        for given in &self.define {
+            match &given.place {
+                Some(place) => places.insert(given.name.clone(), place.clone()),
+                None => places.remove(&given.name),
+            };
+        }
+        places
+    }
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]

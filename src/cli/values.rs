@@ -46,13 +46,15 @@ pub(super) struct Definition {
     pub value: f64,
     /// The dimension of the value; `None` if it was given without a unit.
     pub dimension: Option<Dimension>,
+    /// The file of params that sets it and the line, such as `params.toml:3`; `None` for `-D`.
+    pub place: Option<String>,
 }
 
 /// `NAME=VALUE`, the value with or without a unit.
 pub(super) fn definition(text: &str) -> Result<Definition, String> {
     let (name, value) = text.split_once('=').ok_or("expected NAME=VALUE")?;
     let (value, dimension) = parse_quantity(value)?;
-    Ok(Definition { name: name.trim().to_string(), value, dimension })
+    Ok(Definition { name: name.trim().to_string(), value, dimension, place: None })
 }
 
 /// Which warnings count as errors.

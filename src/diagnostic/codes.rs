@@ -266,6 +266,16 @@ place fulfils both comparisons, so the ends are likely exchanged.
     rfm 1
     param low = 2 in 0 .. 5
     solid slab = low <= z <= 1 and x^2 + y^2 <= 1";
+NOTHING_LEFT = "W0422":
+"`.round` takes a radius from the corners of a shape, a negative `.offset` moves its faces inwards, and `.shell` leaves a wall of
+its thickness. It is proven that nothing is left of the shape, or of the hollow within a shell, because it is less than twice as
+wide as that length somewhere.
+
+    rfm 1
+    solid plate = box([0, 0, 0], [4, 3, 0.2]).round(0.5)     # 0.2 high: a radius below 0.1 leaves some of it";
+SPINDLE = "W0423":
+"`torus(R, r)` has a ring with the radius R and a section with the radius r. If r is larger than R it cuts itself along the axis:
+it has no hole, and looks like an apple. Most often the two are exchanged: `torus(1, 0.2)` is a slender ring.";
 FLUID_IN_OBSTACLE = "W0501":
 "Part of the fluid's shape lies inside an obstacle, or outside the box or the container. Those particles are carved off before the
 run starts. `rfm check` and editors tell of it where more than a quarter of the shape is taken.";
@@ -296,7 +306,8 @@ drop at rest, and it is told where that is not small against the speeds of the s
 damps it, and with smaller particles it is slower.";
 FRAMES = "W0505":
 "Frames are saved so rarely that none lies between the start and the end of the run, or so often that they fill a disk.
-`save_every` is the simulated time between two of them, `until` that of the whole run.";
+`save_every` is the simulated time between two of them, `until` that of the whole run. The same is told of checkpoints and of the
+samples of a probe that the run ends before.";
 TOO_MUCH = "W0506":
 "The run needs more memory or room on the disk than there is now. Fewer particles, a longer `save_every`, or
 --no-frames make it smaller.";
@@ -348,6 +359,13 @@ SLOW_SOUND = "W0520":
 by about the square of its speed over that of sound: 1 % at a tenth, 5 % at more than a fifth. Beyond, it is a gas, and what is
 found is not that of a liquid. Left out, the speed of sound is ten times the greatest expected speed u, or with surface tension σ
 ten times √(u² + σ/ρa), with the spacing a.";
+NOTHING_COMPARED = "W0521":
+"`from` in the block `truth` says from when on its solution holds, and the run ends before. So there is no frame at which the
+flow is compared with it.";
+FLUID_OF_TIME = "W0522":
+"The fluid's `shape` says where the fluid is at the start. Its particles are placed once, at t = 0, so a formula with the time `t`
+has no effect on them later. Obstacles and the container may move; a fluid gets its motion from its `velocity`, from gravity and
+from them.";
 OBSTACLE_FILLS_BOX = "E0502":
 "The obstacle covers every place where fluid was to be put: nothing is left to simulate.";
 }

@@ -44,7 +44,7 @@ pub(crate) use bounds::range::{
 };
 pub(crate) use contraction::{
     Contracted, Contractor, LinearForm, SURFACE_ROUNDING, Wanted, contract_linear, contract_linear_around,
-    reach,
+    is_nowhere_positive, reach,
 };
 pub(crate) use derived::contact::{contact, wall_velocity};
 pub(crate) use derived::forward::forward_gradient;

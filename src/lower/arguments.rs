@@ -99,6 +99,10 @@ impl<'a> Lowering<'a> {
             };
             self.scope.locals.push(local);
         }
+        if source == SourceId::Prelude && name == "torus" {
+            let parameters = self.scope.locals.clone();
+            self.warn_of_spindle(&parameters, span);
+        }
         let value = self.expr(&function.body);
         self.scope = outer;
         value

@@ -28,6 +28,7 @@ mod paths;
 mod probes;
 mod rounding;
 mod scene;
+mod sizes;
 mod slips;
 mod transforms;
 mod tubes;
@@ -63,6 +64,8 @@ pub struct Options {
     pub overrides: BTreeMap<String, f64>,
     /// Dimensions of those overrides that were given with a unit.
     pub dimensions: BTreeMap<String, Dimension>,
+    /// Where those overrides stand that a file of params gives, such as `params.toml:3`. The others are set by `-D`.
+    pub places: BTreeMap<String, String>,
     /// Most operations to which a file may unroll. `None` for [`MAX_NODES`], or [`NODES_PER_BYTE`] for each
     /// byte of the file and of those that it imports if that is more.
     pub max_nodes: Option<usize>,
@@ -74,6 +77,24 @@ pub struct Options {
     pub open: Option<OpenParams>,
     /// The files that the file may name. By default there are none.
     pub files: Files,
+}
+
+impl Options {
+    /// How a param is given a value where it is given one now: by `-D d=8mm`, or by a line of a file.
+    fn setting(&self, name: &str, value: &str) -> String {
+        match self.places.get(name) {
+            None => format!("write -D {name}=\"{value}\""),
+            Some(place) => format!("write {name} = \"{value}\" at {place}"),
+        }
+    }
+
+    /// A message about the value that a param is given, with the place of that value if it stands in a file.
+    fn about_setting(&self, name: &str, message: String) -> String {
+        match self.places.get(name) {
+            None => message,
+            Some(place) => format!("{place}: {message}"),
+        }
+    }
 }
 
 /// Which params stay open.
@@ -251,7 +272,7 @@ impl<'a> Lowering<'a> {
         let given =
             ParamValue { name: qualified, value, range, unit, doc: param.doc.clone(), span: param.name.span };
         let fits = (overridden.is_none() || self.override_fits(&given, options))
-            && self.param_fits(param, &given, overridden.is_some());
+            && self.param_fits(param, &given, overridden.map(|_| options));
         let is_open = options.open.as_ref().is_some_and(|open| !open.fixed.contains(&given.name));
         let value_now = match (fits, is_open) {
             (false, _) => Value::Failed,
@@ -286,13 +307,21 @@ impl<'a> Lowering<'a> {
                 let si = unit.dimension.unit().unwrap_or("in SI units");
                 let message =
                     format!("`{name}` = {0} means {0} {si}, and the file writes it in {text}", param.value);
+                let message = options.about_setting(name, message);
                 self.report(
                     Diagnostic::warning(Code::BARE_OVERRIDE, param.span, message).at("declared here").help(
-                        format!(
-                            "write -D {name}=\"{}\", or -D {name}=\"{} {text}\" if that is meant",
-                            param.shown(param.value),
-                            param.value
-                        ),
+                        match options.places.contains_key(name) {
+                            false => format!(
+                                "write -D {name}=\"{}\", or -D {name}=\"{} {text}\" if that is meant",
+                                param.shown(param.value),
+                                param.value
+                            ),
+                            true => format!(
+                                "write {name} = \"{}\", or {name} = \"{} {text}\" if that is meant",
+                                param.shown(param.value),
+                                param.value
+                            ),
+                        },
                     ),
                 );
             }
@@ -303,10 +332,11 @@ impl<'a> Lowering<'a> {
         }
         let message =
             format!("the unit that `{name}` is given in does not fit: the file writes it in {text}");
+        let message = options.about_setting(name, message);
         self.report(
             Diagnostic::error(Code::OVERRIDE, param.span, message)
                 .at("declared here")
-                .help(format!("as in -D {name}=\"{}\"", in_unit(unit.factor, *unit, text))),
+                .help(options.setting(name, &in_unit(unit.factor, *unit, text))),
         );
         false
     }
@@ -329,8 +359,9 @@ impl<'a> Lowering<'a> {
         false
     }
 
-    /// Whether a param's value is a finite number within its range. If not, this is reported.
-    fn param_fits(&mut self, param: &Param, given: &ParamValue, overridden: bool) -> bool {
+    /// Whether a param's value is a finite number within its range. If not, this is reported. `options` are given
+    /// if they have set the value.
+    fn param_fits(&mut self, param: &Param, given: &ParamValue, options: Option<&Options>) -> bool {
         let (value, shown) = (given.value, given.shown(given.value));
         if let Some((low, high)) = given.range
             && low > high
@@ -358,9 +389,10 @@ impl<'a> Lowering<'a> {
             && !(low <= value && value <= high)
         {
             let [first, last] = [low, high].map(|end| given.shown(end));
-            let diagnostic = if overridden {
+            let diagnostic = if let Some(options) = options {
                 let message =
                     format!("`{}` is set to {shown}, outside its range {first} .. {last}", given.name);
+                let message = options.about_setting(&given.name, message);
                 let diagnostic =
                     Diagnostic::error(Code::OVERRIDE, param.name.span, message).at("declared here");
                 match given
@@ -369,8 +401,8 @@ impl<'a> Lowering<'a> {
                     .filter(|(unit, _)| low <= value * unit.factor && value * unit.factor <= high)
                 {
                     Some((_, unit)) => diagnostic.help(format!(
-                        "numbers without a unit are in SI units: write -D {}=\"{value} {unit}\"",
-                        given.name
+                        "numbers without a unit are in SI units: {}",
+                        options.setting(&given.name, &format!("{value} {unit}"))
                     )),
                     None => diagnostic,
                 }
@@ -382,10 +414,11 @@ impl<'a> Lowering<'a> {
             self.report(diagnostic);
         } else if !value.is_finite() {
             let message = format!("`{}` is {value}, which is not a finite number", param.name.text);
-            let (code, at) = if overridden {
-                (Code::OVERRIDE, param.name.span)
-            } else {
-                (Code::OUT_OF_RANGE, param.value.span)
+            let (code, at, message) = match options {
+                Some(options) => {
+                    (Code::OVERRIDE, param.name.span, options.about_setting(&given.name, message))
+                }
+                None => (Code::OUT_OF_RANGE, param.value.span, message),
             };
             self.report(Diagnostic::error(code, at, message));
         } else {
@@ -539,12 +572,17 @@ impl<'a> Lowering<'a> {
         for name in options.overrides.keys().filter(|name| !declared.contains(name)) {
             let span = Span::new(SourceId::File, 0, 0);
             let message = format!("`{name}` is set, but the file declares no such param");
+            let message = options.about_setting(name, message);
             let mut diagnostic = Diagnostic::error(Code::OVERRIDE, span, message);
             diagnostic = match crate::diagnostic::nearest(name, declared.iter().map(String::as_str)) {
                 Some(near) => diagnostic.help(format!("did you mean `{near}`?")),
-                None if vocabulary::is_key(name) => diagnostic.help(format!(
-                    "it is a key of scenes: declare a param for it, as in `param p = …` and `{name}: p`, and write `-D p=…`"
-                )),
+                None if vocabulary::is_key(name) => {
+                    let set =
+                        if options.places.contains_key(name) { "set `p` here" } else { "write `-D p=…`" };
+                    diagnostic.help(format!(
+                        "it is a key of scenes: declare a param for it, as in `param p = …` and `{name}: p`, and {set}"
+                    ))
+                }
                 None if declared.is_empty() => diagnostic.help("the file declares no params"),
                 None => diagnostic.help(format!("declared params: {}", declared.join(", "))),
             };

@@ -25,7 +25,12 @@ impl Lowering<'_> {
     /// The shape with its faces moved outwards by a length, which may depend on place and time.
     pub fn offset_shape(&mut self, shape: Node, by: &(Value, Span), span: Span) -> Option<Node> {
         let length = self.as_number(&by.0, by.1)?;
-        self.made_anew(shape, Anew::Offset(length), span)
+        let moved = self.made_anew(shape, Anew::Offset(length), span)?;
+        if let Some(inwards) = self.known_value(length).filter(|length| *length < 0.0) {
+            let within = ir::reach(&self.module.graph, shape);
+            self.warn_of_nothing_left(moved, within, -inwards, span);
+        }
+        Some(moved)
     }
 
     /// The shape with the distances of its parts as field, joined by the least and the greatest.

@@ -185,7 +185,7 @@ impl Lowering<'_> {
         };
         let mut angles = [0.0; 2];
         for (angle, (value, argument)) in angles.iter_mut().zip(from_to.0.iter().zip(from_to.1)) {
-            if !self.no_length(&argument.value) {
+            if !self.may_be_angle(&argument.value) {
                 return Value::Failed;
             }
             let node = self.as_number(value, argument.value.span);

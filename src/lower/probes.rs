@@ -6,6 +6,7 @@ use glam::DVec3;
 
 use super::lowering::Lowering;
 use super::scene::declaration::{SceneKey, declare_keys, names};
+use super::scene::run::seconds_as_written;
 use super::scene::{AskedMean, Block, SceneProbe};
 use crate::diagnostic::{Code, Diagnostic};
 use crate::geom::Aabb;
@@ -83,6 +84,15 @@ impl<'a> Lowering<'a> {
             }
             let block = self.block(entries, "a probe", span, keys::ALL, &[]);
             let every = self.stated_number(&block, &keys::EVERY);
+            if let (Some(Some(every)), Some((_, value))) = (every, block.setting(keys::EVERY.name))
+                && every > around.until
+            {
+                let [until, every] = [around.until, every].map(seconds_as_written);
+                let message =
+                    format!("a sample every {every} in a run of {until}: only its start is measured");
+                let help = "without this key there is a sample with every frame";
+                self.report(Diagnostic::warning(Code::FRAMES, value.span, message).help(help));
+            }
             let Some(measured) = self.measured(&block, around) else { continue };
             if let (Some(every), Some(mean)) = (every, self.mean(&block, measured, around.until)) {
                 probes.push(SceneProbe { name: label.text.clone(), span: label.span, measured, every, mean });

@@ -75,6 +75,7 @@ impl Lowering<'_> {
         }
         let Rounded { field, around } = done[&root];
         let fillets = joints.values().any(|joint| matches!(joint, Joint::Or(_))) && radii.inner.is_some();
+        self.warn_of_nothing_left(field, within, radii.length, span);
         Some(if fillets { self.around(field, around, span) } else { field })
     }
 

@@ -276,17 +276,36 @@ impl Lowering<'_> {
         !is_angle
     }
 
-    /// Reports a length where an angle is asked for, as in `.rotate_z(5 mm)`.
-    pub fn no_length(&mut self, expr: &Expr) -> bool {
-        let ExprKind::Quantity { unit, .. } = &without_sign(expr).kind else { return true };
-        let is_length = parse_unit(&unit.text).is_some_and(|unit| unit.dimension == Dimension::LENGTH);
-        if is_length {
-            self.report(
-                Diagnostic::error(Code::UNIT_MISMATCH, unit.span, "a length is not an angle")
-                    .help("write an angle such as `45 deg` or `0.8 rad`"),
-            );
-        }
-        !is_length
+    /// Whether a value may be an angle. One with a unit of another kind is reported, as in `.rotate_z(5 mm)`, and
+    /// in `.rotate_z(w)` after `param w = 30 rpm`.
+    pub fn may_be_angle(&mut self, expr: &Expr) -> bool {
+        let inner = without_sign(expr);
+        let (dimension, span) = match &inner.kind {
+            ExprKind::Quantity { unit, .. } => (parse_unit(&unit.text).map(|unit| unit.dimension), unit.span),
+            ExprKind::Name(name) => {
+                let is_local = self.scope.locals.iter().any(|local| local.name == *name);
+                (self.dimensions.get(name).copied().filter(|_| !is_local), inner.span)
+            }
+            _ => return true,
+        };
+        let written = self.written(inner).unwrap_or("w").to_string();
+        let (message, help) = match dimension {
+            Some(Dimension::LENGTH) => {
+                ("a length is not an angle".into(), "write an angle such as `45 deg` or `0.8 rad`".into())
+            }
+            // a number with such a unit is no value of a shape, which is reported
+            Some(Dimension::TURN_RATE) if matches!(inner.kind, ExprKind::Name(_)) => (
+                format!("`{written}` is a rate of turning, not an angle"),
+                format!("write `{written}*t` for a shape that turns as time passes"),
+            ),
+            Some(Dimension::FREQUENCY) if matches!(inner.kind, ExprKind::Name(_)) => (
+                format!("`{written}` is a rate, not an angle"),
+                format!("write `2*pi*{written}*t` for a shape that turns so often in a second"),
+            ),
+            Some(_) | None => return true,
+        };
+        self.report(Diagnostic::error(Code::UNIT_MISMATCH, span, message).help(help));
+        false
     }
 
     /// How the arguments of a method are written, for a call that has them wrong.

@@ -195,7 +195,7 @@ impl<'a> Lowering<'a> {
                 return Value::Failed;
             }
             if kind == ParameterKind::Angle {
-                if !self.no_length(&argument.value) {
+                if !self.may_be_angle(&argument.value) {
                     return Value::Failed;
                 }
                 if let Value::Number(node) = &value {

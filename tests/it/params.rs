@@ -2,7 +2,7 @@
 
 use crate::tool::rfm;
 
-const FILE: &str = "rfm 1\nparam r = 0.5 in 0.01 .. 2\nparam h = 1 m\nsolid post = cylinder(r, h)\n";
+const FILE: &str = "rfm 1\nparam r = 0.5 in 0.01 .. 2\nparam h = 1 m\nparam d = 20 mm\nsolid post = cylinder(r, h)\nsolid ball = sphere(d)\n";
 
 #[test]
 fn params_come_from_files_and_flags_go_before_them() {
@@ -22,14 +22,25 @@ fn params_come_from_files_and_flags_go_before_them() {
     assert_eq!(bounds(&["-D", "h=2m", "-P", "a.toml"]), [0.25, 2.0]);
 
     for (text, expected) in [
-        ("q = 1", "no such param"),
-        ("r = [1]", "`r` in `bad.toml` is no number"),
-        ("r = \"8 kg/\"", "`r` in `bad.toml`"),
-        ("r = = 1", "cannot read the params of `bad.toml`"),
+        ("\nq = 1", "bad.toml:2: `q` is set, but the file declares no such param"),
+        ("\ndensity = 1", "and set `p` here"),
+        ("# 3\nr = 3", "bad.toml:2: `r` is set to 3, outside its range 0.01 .. 2"),
+        ("d = 8", "bad.toml:1: `d` = 8 means 8 m, and the file writes it in mm"),
+        ("d = 8", "write d = \"8000 mm\", or d = \"8 mm\" if that is meant"),
+        ("h = \"8 kg\"", "bad.toml:1: the unit that `h` is given in does not fit"),
+        ("h = \"8 kg\"", "write h = \"1 m\" at bad.toml:1"),
+        ("\nr = [1]", "bad.toml:2: `r` is no number"),
+        ("r = \"8 kg/\"", "bad.toml:1: `r`: "),
+        ("h = 1\nr = = 1", "cannot read the params of `bad.toml`: line 2: "),
     ] {
         write("bad.toml", text);
-        let outcome = rfm(folder.path(), &["check", "a.rfm", "-P", "bad.toml"]).expect(2);
+        let outcome = rfm(folder.path(), &["check", "a.rfm", "-P", "bad.toml"]);
         assert!(outcome.stderr.contains(expected), "{text}: {}", outcome.stderr);
+        assert!(!outcome.stderr.contains("-D "), "{text}: {}", outcome.stderr);
     }
     rfm(folder.path(), &["check", "a.rfm", "-P", "missing.toml"]).expect(2);
+    // what a flag sets in place of a file is the flag's
+    write("bad.toml", "r = 3");
+    let outcome = rfm(folder.path(), &["check", "a.rfm", "-P", "bad.toml", "-D", "r=4"]).expect(2);
+    assert!(outcome.stderr.contains("error[E0211]: `r` is set to 4"), "{}", outcome.stderr);
 }

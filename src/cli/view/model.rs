@@ -30,6 +30,8 @@ pub(super) struct Subject {
     chosen: Option<String>,
     cells: usize,
     define: BTreeMap<String, f64>,
+    /// Where those of them stand that a file sets.
+    places: BTreeMap<String, String>,
     dimensions: BTreeMap<String, Dimension>,
     max_nodes: Option<usize>,
     /// The files that it names.
@@ -78,6 +80,7 @@ impl Subject {
             solid: options.solid.clone(),
             chosen: None,
             cells: options.mesh_cells,
+            places: shared.places(),
             define: shared.define.iter().map(|given| (given.name.clone(), given.value)).collect(),
             dimensions: shared
                 .define
@@ -125,9 +128,12 @@ impl Subject {
         let mut overrides = self.define.clone();
         overrides.extend(values.iter().map(|(name, value)| (name.clone(), *value)));
         let dimensions = self.dimensions.clone();
+        let mut places = self.places.clone();
+        places.retain(|name, _| !values.contains_key(name));
         let options = Options {
             overrides,
             dimensions,
+            places,
             max_nodes: self.max_nodes,
             files: self.files.clone(),
             ..Options::default()

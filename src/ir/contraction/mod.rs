@@ -33,6 +33,6 @@ mod slopes;
 
 pub use contractor::{Contractor, Wanted};
 pub use linear::{LinearForm, contract_linear, contract_linear_around};
-pub use reach::reach;
+pub use reach::{is_nowhere_positive, reach};
 pub use sets::Contracted;
 pub use slopes::SURFACE_ROUNDING;

@@ -11,6 +11,7 @@ use crate::geom::Aabb;
 use crate::ir::bounds::range::Region;
 use crate::ir::derived::sign::SignRule;
 use crate::ir::graph::{Expr, Graph, Node};
+use crate::ir::interpreter::Interpreter;
 use crate::ir::op::Binary;
 
 /// Half the side of the cube that is searched.
@@ -36,6 +37,44 @@ pub fn reach(graph: &Graph, root: Node) -> Option<Aabb> {
     let found = junctions.above(root, false, 0.0);
     let ends = found.min.abs().max(found.max.abs()).max_element();
     (!found.is_empty() && ends < OF_USE).then_some(found)
+}
+
+/// Whether it is proven that a root is positive at no point and no time. Formulas that would take long are not
+/// looked at.
+pub fn is_nowhere_positive(graph: &Graph, root: Node) -> bool {
+    /// Each box is contracted with the whole formula.
+    const MOST_NODES: usize = 2000;
+    const MOST_BOXES: usize = 100;
+    let (graph, root) = folded(graph, root);
+    if graph.len() > MOST_NODES {
+        return false;
+    }
+    let mut junctions = Junctions { graph: &graph, known: FxHashMap::default() };
+    let mut waiting = vec![junctions.above(root, false, 0.0)];
+    for _ in 0..MOST_BOXES {
+        let Some(space) = waiting.pop() else { return true };
+        let left = junctions.contracted(root, false, 0.0, space);
+        if left.is_empty() {
+            continue;
+        }
+        let (size, centre) = (left.size(), left.centre());
+        if size.max_element() > OF_USE || value_at(&graph, root, centre) > 0.0 {
+            return false;
+        }
+        let axis = size.max_position();
+        let (mut low, mut high) = (left, left);
+        low.max[axis] = centre[axis];
+        high.min[axis] = centre[axis];
+        waiting.extend([low, high]);
+    }
+    false
+}
+
+/// The value of a root at a point at the time 0.
+fn value_at(graph: &Graph, root: Node, at: DVec3) -> f64 {
+    let mut value = [0.0];
+    Interpreter::new(graph, &[root]).eval_f64(at.to_array(), &mut value);
+    value[0]
 }
 
 /// The graph of a root alone, with parts that use no coordinate replaced by their values, because rules look
@@ -168,5 +207,10 @@ mod tests {
         assert!((found.min + DVec3::ONE).abs().max_element() < 1e-9, "{found:?}");
         assert!(reach(&graph, square).is_none());
         assert!(reach(&graph, x).is_none());
+        for (by, expected) in [(0.5, false), (1.5, true)] {
+            let by = graph.constant(by);
+            let smaller = graph.binary(Binary::Sub, cube, by);
+            assert_eq!(is_nowhere_positive(&graph, smaller), expected);
+        }
     }
 }

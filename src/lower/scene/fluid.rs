@@ -5,7 +5,7 @@ use super::super::lowering::Lowering;
 use super::declaration::{SceneKey, declare_keys, names as key_names};
 use super::{Block, Fluid, Solver};
 use crate::diagnostic::{Code, Diagnostic, Span};
-use crate::ir::Node;
+use crate::ir::{Axis, Node};
 use crate::precision::Precision;
 use crate::quantity::{Bound, Dimension};
 use crate::sph::{Fill, KeyBlock, KeyReader, Method};
@@ -157,6 +157,7 @@ impl<'a> Lowering<'a> {
         let shape = match block.setting(keys::SHAPE.name) {
             Some((_, value)) => self.shape(value).map(|node| {
                 self.warn_of_constant("the fluid's shape", node, value);
+                self.warn_of_time(node, value.span);
                 (node, value.span)
             }),
             None => {
@@ -200,6 +201,18 @@ impl<'a> Lowering<'a> {
             jitter: jitter?,
             seed: seed?? as u64,
         })
+    }
+
+    /// Warns of a fluid's shape that depends on the time: particles are placed once.
+    fn warn_of_time(&mut self, shape: Node, at: Span) {
+        if self.module.graph.uses(shape, Axis::T) {
+            let message = "the fluid's shape depends on the time, and particles are placed once";
+            self.report(
+                Diagnostic::warning(Code::FLUID_OF_TIME, at, message)
+                    .at("its shape at t = 0 is filled")
+                    .help("to bring the fluid in motion state its `velocity`, or move an obstacle"),
+            );
+        }
     }
 
     /// Reads density, mass and support radius of the particles. A spacing may replace the mass.

@@ -12,9 +12,6 @@ use crate::sph::{KeyBlock, Method};
 use crate::syntax::ast::{Entry, Expr, ExprKind, Name};
 use crate::syntax::foreign;
 
-/// Blocks whose keys are often looked for one block too far out.
-const INNER: [&str; 4] = ["picture", "run", "fluid", "solver"];
-
 /// What there is to say to a kinematic viscosity.
 const DYNAMIC: &str =
     "`viscosity` is the dynamic one, that is the kinematic one times the density: water has `1e-3 Pa·s`";
@@ -59,6 +56,29 @@ pub(in crate::lower) struct Block<'a> {
     pub label: Option<&'a Name>,
     what: &'static str,
     pub span: Span,
+}
+
+/// The blocks one level further in that have a key, in the order in which they are declared.
+fn blocks_with(key: &str, declared: &[SceneKey]) -> Vec<&'static str> {
+    let of_methods = |block: &str| {
+        let block = [KeyBlock::Fluid, KeyBlock::Solver].into_iter().find(|known| known.name() == block);
+        block.is_some_and(|block| !Method::with_key(block, key).is_empty())
+    };
+    let has_key = |block: &&SceneKey| {
+        let own = block.block();
+        own.is_some_and(|keys| names(keys).any(|name| name == key) || of_methods(block.name))
+    };
+    declared.iter().filter(has_key).map(|block| block.name).collect()
+}
+
+/// Names in a sentence: `a`, `b` and `c`.
+fn listed(names: &[&str]) -> String {
+    let quoted: Vec<String> = names.iter().map(|name| format!("`{name}`")).collect();
+    match &quoted[..] {
+        [] => String::new(),
+        [one] => one.clone(),
+        [first @ .., last] => format!("{} and {last}", first.join(", ")),
+    }
 }
 
 impl<'a> Lowering<'a> {
@@ -113,30 +133,24 @@ impl<'a> Lowering<'a> {
                 let own = foreign::key(&key.text);
                 let elsewhere = own.filter(|own| known.contains(own));
                 let inner_key = own.unwrap_or(key.text.as_str());
-                let has_key = |keys: &[SceneKey]| names(keys).any(|name| name == inner_key);
-                let opens = |block: &&str| {
-                    declared.iter().any(|known| known.name == *block && known.block().is_some_and(has_key))
-                };
-                let inner = INNER.into_iter().find(opens);
-                let of_methods = [KeyBlock::Fluid, KeyBlock::Solver].into_iter().find(|block| {
-                    known.contains(&block.name()) && !Method::with_key(*block, inner_key).is_empty()
-                });
-                let inner = inner.or(of_methods.map(KeyBlock::name));
+                let inner = blocks_with(inner_key, declared);
                 let absent = ABSENT
                     .iter()
                     .find(|(block, keys, _)| *block == what && keys.contains(&key.text.as_str()));
                 let is_outer = OUTER.contains(&key.text.as_str());
-                self.report(match (elsewhere, inner) {
+                self.report(match (elsewhere, &inner[..]) {
                     (Some(own), _) => diagnostic
                         .help(format!("`{}` is called `{own}` here", key.text))
                         .edit(key.span, &key.text, own, false),
-                    (None, Some(block)) => diagnostic
-                        .help(format!("it is a key of `{block}`: write `{block} {{ {inner_key}: … }}`")),
-                    (None, None) if is_outer => diagnostic.help(format!(
+                    (None, [block, ..]) => diagnostic.help(format!(
+                        "it is a key of {}: write `{block} {{ {inner_key}: … }}`",
+                        listed(&inner)
+                    )),
+                    (None, []) if is_outer => diagnostic.help(format!(
                         "it is a key of the scene: write `{}: …` outside of this block",
                         key.text
                     )),
-                    (None, None) => match absent {
+                    (None, []) => match absent {
                         Some((.., help)) => diagnostic.help(*help),
                         None => diagnostic,
                     },

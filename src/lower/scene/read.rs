@@ -104,8 +104,8 @@ impl<'a> Lowering<'a> {
             .filter_map(|(_, entries, span)| self.obstacle(entries, span, "an obstacle", walls))
             .collect();
         let gravity = self.gravity(&block);
-        let truth = self.truth(&block);
         let run = self.run(&block);
+        let truth = self.truth(&block, run.map(|run| run.until));
         let container_name = container.iter().map(|c| &c.name[..]);
         let bodies: Vec<&str> = container_name.chain(obstacles.iter().map(|o| &o.name[..])).collect();
         // a body that is missing has mistakes that were reported

@@ -87,7 +87,7 @@ impl<'a> Lowering<'a> {
 }
 
 /// A time as a file writes it, with two digits: `50 ms`, `0.2 s`.
-fn seconds_as_written(time: f64) -> String {
+pub(in crate::lower) fn seconds_as_written(time: f64) -> String {
     let rounded = |value: f64| format!("{value:.1e}").parse().unwrap_or(value);
     if time < 0.1 && time > 1e-5 {
         format!("{} ms", rounded(1e3 * time))

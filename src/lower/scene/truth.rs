@@ -2,6 +2,7 @@
 
 use super::super::lowering::Lowering;
 use super::declaration::{SceneKey, declare_keys};
+use super::run::seconds_as_written;
 use super::{Block, Truth};
 use crate::diagnostic::{Code, Diagnostic};
 
@@ -20,7 +21,8 @@ declare_keys! {
 }
 
 impl<'a> Lowering<'a> {
-    pub(super) fn truth(&mut self, block: &Block<'_>) -> Option<Option<Truth>> {
+    /// Reads the truth of a scene whose run ends at `until`, s, if that is known.
+    pub(super) fn truth(&mut self, block: &Block<'_>, until: Option<f64>) -> Option<Option<Truth>> {
         let Some((_, entries, span)) = block.blocks("truth").next() else { return Some(None) };
         let block = self.block(entries, "a truth", span, keys::ALL, &[]);
         let mut formula = |key: &SceneKey| match block.setting(key.name) {
@@ -49,6 +51,17 @@ impl<'a> Lowering<'a> {
             return None;
         }
         let from = self.number_key(&block, &keys::FROM)?;
+        if let (Some(until), Some((_, value))) = (until, block.setting(keys::FROM.name))
+            && from > until
+        {
+            let [from, until] = [from, until].map(seconds_as_written);
+            let message = format!("the solution holds from {from} on, and the run ends at {until}");
+            self.report(
+                Diagnostic::warning(Code::NOTHING_COMPARED, value.span, message)
+                    .at("nothing is compared with it")
+                    .help("state an earlier `from`, or a later `until` in the block `run`"),
+            );
+        }
         Some(Some(Truth { pressure, velocity, front, from }))
     }
 }

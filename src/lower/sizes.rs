@@ -1,0 +1,63 @@
+//! Sizes that do not fit one another: shapes of which nothing is left, walls that fill their shape, tori that
+//! cut themselves. The messages ask.
+
+use super::lowering::{Local, Lowering};
+use crate::diagnostic::{Code, Diagnostic, SourceId, Span};
+use crate::geom::Aabb;
+use crate::ir::{self, Node};
+
+/// The function of the standard solids that takes away what an offset leaves.
+const SHELL: &str = "shell";
+
+impl Lowering<'_> {
+    /// Warns of a shape of which a radius or an offset leaves nothing. `within` is a box around the shape before,
+    /// and `by` the length by which its faces move inwards at most.
+    ///
+    /// A shape that is more than twice as wide as that everywhere keeps its middle, so it is not looked at: the
+    /// proof takes time.
+    pub fn warn_of_nothing_left(&mut self, left: Node, within: Option<Aabb>, by: f64, span: Span) {
+        let is_narrow = within.is_some_and(|within| within.size().min_element() <= 2.0 * by);
+        if !is_narrow || self.has_open_params || !ir::is_nowhere_positive(&self.module.graph, left) {
+            return;
+        }
+        let at = self.user_span(span);
+        let call = self.scope.calls.last();
+        let is_shell = call.is_some_and(|call| call.source == SourceId::Prelude && call.function == SHELL);
+        // bounds are found by search, and have rounding errors
+        let least = within.map_or(0.0, |within| within.size().min_element());
+        let narrowest: f64 = format!("{least:.3e}").parse().unwrap_or(least);
+        let (message, help) = if is_shell {
+            (
+                format!("a wall of {by} fills the shape, which is {narrowest} wide: nothing of it is hollow"),
+                format!("a thickness below {} leaves a hollow", narrowest / 2.0),
+            )
+        } else {
+            (
+                format!("nothing of the shape is left: it is {narrowest} wide, and {by} is too much for it"),
+                format!("a length below {} leaves some of it", narrowest / 2.0),
+            )
+        };
+        self.report(Diagnostic::warning(Code::NOTHING_LEFT, at, message).help(help));
+    }
+
+    /// Warns of a torus whose section is wider than its ring: it cuts itself, and has no hole.
+    pub fn warn_of_spindle(&mut self, parameters: &[Local], span: Span) {
+        let known = |name: &str| {
+            let local = parameters.iter().find(|local| local.name == name)?;
+            let super::value::Value::Number(node) = local.value else { return None };
+            self.known_value(node)
+        };
+        let (Some(ring), Some(section)) = (known("R"), known("r")) else { return };
+        if section > ring && ring > 0.0 {
+            let message =
+                format!("the section of this torus, r = {section}, is wider than its ring, R = {ring}");
+            self.report(
+                Diagnostic::warning(Code::SPINDLE, self.user_span(span), message)
+                    .at("it cuts itself and has no hole")
+                    .help(format!(
+                        "the radius of the ring comes first: is `torus({section}, {ring})` meant?"
+                    )),
+            );
+        }
+    }
+}
