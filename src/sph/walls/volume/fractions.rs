@@ -69,7 +69,9 @@ impl Fractions {
 
     fn make(&self, lattice: &Lattice, at: [usize; 3]) -> Tile {
         let first = at.map(|n| n * TILE);
-        let range = self.range(&lattice.cells_from(first, TILE));
+        let within = lattice.cells_from(first, TILE);
+        let near = self.near(lattice, &within);
+        let range = near.range(&within);
         if range.hi < 0.0 {
             return Tile::Empty;
         }
@@ -77,7 +79,7 @@ impl Fractions {
             return Tile::Full;
         }
         let mut cells = vec![Filled::default(); TILE * TILE * TILE];
-        self.fill(lattice, &mut cells, first, [0; 3], TILE);
+        near.fill(&mut cells, first, [0; 3], TILE);
         let is_all = |filled: Filled| cells.iter().all(|cell| *cell == filled);
         match () {
             () if is_all(Filled::default()) => Tile::Empty,
@@ -86,8 +88,27 @@ impl Fractions {
         }
     }
 
+    /// The bodies that may fill some of a box. In a scene with many bodies these are few, and all others would be asked
+    /// at each place.
+    fn near<'a>(&'a self, lattice: &'a Lattice, within: &Aabb) -> Near<'a> {
+        // places on the walls of the box are moved inwards
+        let asked = within.grown(BESIDE_WALL * lattice.step.max_element());
+        let may_fill = |body: &&dyn Walls| !(body.range(&asked).hi < 0.0);
+        let bodies = self.bodies.iter().map(|body| &**body as &dyn Walls);
+        Near { bodies: bodies.filter(may_fill).collect(), lattice }
+    }
+}
+
+/// The bodies that may fill the cells of a tile.
+struct Near<'a> {
+    bodies: Vec<&'a dyn Walls>,
+    lattice: &'a Lattice,
+}
+
+impl Near<'_> {
     /// Fills the cells of a tile from `at` on, `size` along each axis. Cells beyond the lattice stay empty.
-    fn fill(&self, lattice: &Lattice, cells: &mut [Filled], first: [usize; 3], at: [usize; 3], size: usize) {
+    fn fill(&self, cells: &mut [Filled], first: [usize; 3], at: [usize; 3], size: usize) {
+        let lattice = self.lattice;
         let from: [usize; 3] = std::array::from_fn(|axis| first[axis] + at[axis]);
         if (0..3).any(|axis| from[axis] >= lattice.cells[axis]) {
             return;
@@ -101,18 +122,18 @@ impl Fractions {
             let half = size / 2;
             for corner in 0..8 {
                 let at = std::array::from_fn(|axis| at[axis] + half * (corner >> axis & 1));
-                self.fill(lattice, cells, first, at, half);
+                self.fill(cells, first, at, half);
             }
             return;
         }
-        let filled =
-            if range.lo > 0.0 { Filled::WHOLE } else { self.part(lattice, &within, range).within(&within) };
+        let filled = if range.lo > 0.0 { Filled::WHOLE } else { self.part(&within, range).within(&within) };
         cells[at[0] + TILE * (at[1] + TILE * at[2])] = filled;
     }
 
     /// The filled part of a cell whose range is not of one sign. Its eight parts are treated one by one,
     /// because of curved surfaces and thin parts.
-    fn part(&self, lattice: &Lattice, within: &Aabb, range: Interval) -> Part {
+    fn part(&self, within: &Aabb, range: Interval) -> Part {
+        let lattice = self.lattice;
         // a body that ends in a wall of the box has no surface there
         let margin = BESIDE_WALL * lattice.step;
         let (low, high) = (lattice.domain.min + margin, lattice.domain.max - margin);
