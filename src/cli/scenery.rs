@@ -116,14 +116,23 @@ pub(super) fn half_towards_eye(plane: &Plane, camera: &Camera) -> Cut {
     half(axis, plane.value, axis.dot(camera.towards_eye()) < 0.0)
 }
 
-/// How a body at rest is drawn that a plane opens, or leaves as it is, or takes away.
-pub(super) fn opened_by(cut: Cut, mesh: &Mesh) -> Drawn {
-    let beyond = mesh.positions.iter().map(|p| cut.beyond(*p));
+/// How a body is drawn that a plane opens, or leaves as it is, or takes away. The body lies between these points.
+pub(super) fn opened_by(cut: Cut, points: impl IntoIterator<Item = DVec3>) -> Drawn {
+    let beyond = points.into_iter().map(|p| cut.beyond(p));
     let (least, most) = beyond.fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), x| (a.min(x), b.max(x)));
     match () {
         () if most <= 0.0 => Drawn::Whole,
         () if least >= 0.0 => Drawn::Hidden,
         () => Drawn::Open(cut),
+    }
+}
+
+/// How a body of glass is drawn that would otherwise be drawn like this.
+pub(super) fn glass(drawn: Drawn) -> Drawn {
+    match drawn {
+        Drawn::Whole => Drawn::Glass(None),
+        Drawn::Open(cut) => Drawn::Glass(Some(cut)),
+        Drawn::Hidden | Drawn::Glass(_) => drawn,
     }
 }
 
@@ -186,6 +195,19 @@ pub(super) fn described(names: &[&str], drawn: &[Drawn]) -> Vec<String> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// A plane cuts what lies on both of its sides, and a title says no more.
+    #[test]
+    fn a_plane_that_misses_a_body_does_not_cut_it() {
+        let body = Aabb::new(DVec3::ZERO, DVec3::ONE).corners();
+        let drawn = |at: f64| opened_by(half(DVec3::X, at, false), body);
+        let words = |drawn: Drawn| described(&["blade"], &[drawn]);
+        assert_eq!(words(drawn(0.5)), ["blade cut at x = 0.5"]);
+        assert_eq!(words(drawn(2.0)), [""; 0]);
+        assert_eq!(words(drawn(-1.0)), ["blade left out"]);
+        assert_eq!(words(glass(drawn(0.5))), ["blade cut at x = 0.5"]);
+        assert_eq!(words(glass(drawn(2.0))), [""; 0]);
+    }
 
     /// A wall across a box extends behind its floor: the triangle on the floor is left out, and one that only
     /// touches it stays.

@@ -136,12 +136,22 @@ pub(super) fn of_frames(run: &Path, entries: &[(usize, FrameEntry)]) -> Result<V
     entries.iter().map(of_frame).collect()
 }
 
-/// The surfaces of these frames of a run as far as there are any. Notes which were made of other frames.
+/// The surfaces of these frames of a run as far as there are any. Notes which were made of other frames, and a
+/// list that cannot be read: all else of the run can be shown without it.
 pub(super) fn there_are(
     run: &Path,
     entries: &[(usize, FrameEntry)],
 ) -> Result<Vec<Option<PathBuf>>, Failure> {
-    let Some(surfaces) = Surfaces::of(run)? else { return Ok(vec![None; entries.len()]) };
+    let surfaces = match Surfaces::of(run) {
+        Ok(surfaces) => surfaces,
+        Err(Failure::Usage(message)) => {
+            let again = format!("`rfm mesh {} --fluid` makes them anew", run.shown());
+            note(format!("{message}; surfaces of the fluid are not shown: {again}"));
+            None
+        }
+        Err(other) => return Err(other),
+    };
+    let Some(surfaces) = surfaces else { return Ok(vec![None; entries.len()]) };
     let (mut found, mut others) = (Vec::new(), 0);
     for (_, entry) in entries {
         found.push(match surfaces.of_frame(entry)? {

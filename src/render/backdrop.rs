@@ -339,7 +339,7 @@ mod tests {
     use crate::field::Points;
     use crate::render::ColourMap;
 
-    const MOMENT: Caption = Caption { time: 0.0, step: None };
+    const MOMENT: Caption = Caption { time: 0.0, every: 0.0, step: None };
     const LEGEND: Legend<'_> = Legend {
         title: "test",
         scale: Some(Scale {

@@ -49,7 +49,7 @@ pub use self::{
     hidden::hidden,
     image::Image,
     mesh::MeshView,
-    overlay::{Caption, Legend, Scale},
+    overlay::{Caption, Legend, Scale, digits_of_time},
     particles::ParticlesView,
     shade::{Material, OBSTACLE},
 };

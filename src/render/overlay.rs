@@ -55,6 +55,8 @@ impl<'a> Scale<'a> {
 pub struct Caption {
     /// Simulated time in seconds.
     pub time: f64,
+    /// The time between pictures, s: times are shown with the digits that tell two of them apart. 0 for the usual digits.
+    pub every: f64,
     /// The number of the step, if it is known.
     pub step: Option<u64>,
 }
@@ -153,7 +155,7 @@ pub const CAPTION_HEIGHT: f64 = 44.0;
 /// The time, the step and the number of particles where there are any, in columns that stay in place while
 /// the numbers change.
 pub fn caption(moment: &Caption, particles: usize, scale: f64) -> Result<Layer, RenderError> {
-    let mut words = vec![format!("t = {:.3} s", moment.time)];
+    let mut words = vec![format!("t = {:.*} s", digits_of_time(moment.every), moment.time)];
     words.extend(moment.step.map(|step| format!("step {}", grouped(step))));
     words.extend((particles > 0).then(|| format!("N = {}", grouped(particles as u64))));
     let mut body = String::from(r#"<g font-size="18">"#);
@@ -162,6 +164,13 @@ pub fn caption(moment: &Caption, particles: usize, scale: f64) -> Result<Layer, 
     }
     body.push_str("</g>");
     draw((520.0, CAPTION_HEIGHT), scale, &body)
+}
+
+/// Decimal digits of times that are so far apart, s: two of the difference are shown, and three at least.
+pub fn digits_of_time(every: f64) -> usize {
+    const MOST: f64 = 9.0;
+    let of_difference = 1.0 - libm::log10(every).floor();
+    if every > 0.0 && of_difference > 3.0 { of_difference.min(MOST) as usize } else { 3 }
 }
 
 /// The digits of a number in groups of three, with unbreakable spaces between them.
@@ -232,9 +241,16 @@ mod tests {
     }
 
     #[test]
+    fn times_have_the_digits_that_tell_them_apart() {
+        let digits = [0.0, 0.05, 0.01, 1e-3, 2.5e-4, 1e-6, 1e-20, f64::NAN].map(digits_of_time);
+        assert_eq!(digits, [3, 3, 3, 4, 5, 7, 9, 3]);
+    }
+
+    #[test]
     fn any_title_and_moment_can_be_set() {
         assert!(title("a<b & \"c\"\u{0}", 400.0, 1.0).is_ok());
-        let layer = caption(&Caption { time: f64::NAN, step: Some(u64::MAX) }, 0, 0.1).unwrap();
+        let layer =
+            caption(&Caption { time: f64::NAN, every: f64::NAN, step: Some(u64::MAX) }, 0, 0.1).unwrap();
         assert_eq!((layer.width, layer.height), (52, 5));
     }
 }

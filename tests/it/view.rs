@@ -208,6 +208,17 @@ fn what_is_only_moved_has_one_mesh_and_surfaces_of_the_fluid_are_shown() {
     }
     let other = rfm(here, &["view", "other.out", "--save", "other.html"]).expect(0);
     assert!(other.stderr.contains("3 surfaces") && other.stderr.contains("another run"), "{}", other.stderr);
+    // a list of surfaces that cannot be read takes nothing else away
+    std::fs::write(here.join("drop.out/surface/surface.pvd"), "<VTKFile").unwrap();
+    let broken = rfm(here, &["view", "drop.out", "--save", "-"]).expect(0);
+    assert!(
+        broken.stderr.contains("surface.pvd`: ") && broken.stderr.contains("are not shown"),
+        "{}",
+        broken.stderr
+    );
+    assert_eq!(of(&blocks(&broken.stdout), "frame").len(), 11);
+    assert!(!here.join("-").exists());
+    rfm(here, &["view", "drop.out", "--save", "-", "--json"]).expect(2);
 }
 
 #[test]

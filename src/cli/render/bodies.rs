@@ -8,11 +8,12 @@ use super::options::Render;
 use crate::cli::failure::Failure;
 use crate::cli::output::Shown;
 use crate::cli::saved::{self, RunFigures};
-use crate::cli::scenery::{Drawn, half_towards_eye, opened_by, out_of_the_way};
+use crate::cli::scenery::{Drawn, glass, half_towards_eye, opened_by, out_of_the_way};
 use crate::cli::values::CutFlag;
 use rfm::fluid_surface::{FrameEntry, read_arrays, read_mesh};
 use rfm::mesh::Mesh;
 use rfm::render::Camera;
+use rfm::slice::Plane;
 
 /// Most particles of the first frame that stand for the fluid when it is asked what hides it.
 const MOST_SAMPLES: usize = 3000;
@@ -73,16 +74,17 @@ impl Bodies {
         }
         let is_hidden = |name: &String| self.are_named && options.hide.contains(name);
         let is_glass = |name: &String| self.are_named && options.glass.contains(name);
+        let by_plane = |plane: &Plane, mesh: &Mesh| {
+            let cut = half_towards_eye(plane, camera);
+            // where bodies that move will be is not looked up
+            if self.stand { opened_by(cut, mesh.positions.iter().copied()) } else { Drawn::Open(cut) }
+        };
         let drawn = |(name, mesh): (&String, &Mesh)| match &options.cut {
             _ if is_hidden(name) => Drawn::Hidden,
-            Some(CutFlag::Plane(plane)) if is_glass(name) => {
-                Drawn::Glass(Some(half_towards_eye(plane, camera)))
-            }
+            Some(CutFlag::Plane(plane)) if is_glass(name) => glass(by_plane(plane, mesh)),
             _ if is_glass(name) => Drawn::Glass(None),
             Some(CutFlag::None) => Drawn::Whole,
-            // where bodies that move will be is not looked up
-            Some(CutFlag::Plane(plane)) if !self.stand => Drawn::Open(half_towards_eye(plane, camera)),
-            Some(CutFlag::Plane(plane)) => opened_by(half_towards_eye(plane, camera), mesh),
+            Some(CutFlag::Plane(plane)) => by_plane(plane, mesh),
             Some(CutFlag::Auto) | None => out_of_the_way(camera, name, mesh, &self.samples),
         };
         Ok(self.names.iter().zip(&self.meshes).map(drawn).collect())

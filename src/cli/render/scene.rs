@@ -61,6 +61,8 @@ struct RunScene {
     drawn: Vec<Drawn>,
     domain: Aabb,
     radius: f64,
+    /// The mean time between frames, s.
+    every: f64,
     /// The array that is shown, with its unit and its range.
     shown: Array,
     range: Levels,
@@ -134,8 +136,11 @@ impl RunScene {
         let scale = Scale { label: &label, low: range.low, high: range.high, open, map };
         let legend = Legend { title: &title, scale: (balls || tinted).then_some(scale) };
         let still = scenery::backdrop(&camera, &domain, &legend, drawn.iter().copied().zip(&bodies))?;
+        let length = entries[entries.len() - 1].1.time - entries[0].1.time;
+        let every = length / (entries.len() - 1).max(1) as f64;
         Ok(Self {
             folder: folder.to_path_buf(),
+            every,
             entries,
             meshes: if stands { Vec::new() } else { meshes },
             mesh_of,
@@ -189,7 +194,8 @@ impl RunScene {
             ..scenery::surface(mesh, surface.material())
         }));
         let moving = Moving { meshes: &meshes, particles, balls: self.balls };
-        let image = self.still.frame_with(&moving, &Caption { time: entry.time, step: None });
+        let image =
+            self.still.frame_with(&moving, &Caption { time: entry.time, every: self.every, step: None });
         self.spent.fetch_add(started.elapsed().as_micros() as u64, Ordering::Relaxed);
         self.pictures.fetch_add(1, Ordering::Relaxed);
         self.left_out.fetch_max(image.skipped, Ordering::Relaxed);

@@ -9,7 +9,7 @@ use super::options::Render;
 use crate::cli::failure::Failure;
 use crate::cli::output::{Shown, counted};
 use crate::cli::run::bodies::Bodies;
-use crate::cli::scenery::{self, Drawn, half_towards_eye};
+use crate::cli::scenery::{self, Drawn, half_towards_eye, opened_by};
 use crate::cli::shared::Shared;
 use crate::cli::values::CutFlag;
 use crate::cli::{choose, input, output};
@@ -99,12 +99,13 @@ fn film(shared: &Shared, options: &Render, solid: &Solid, target: &Target) -> Re
     let title = title(options, name, drawn);
     let legend = Legend { title: &title, scale: None };
     let still = Backdrop::new(camera, &domain, &[], &legend).map_err(Failure::usage)?;
+    let every = 1.0 / f64::from(target.rate);
     let picture = |k: usize| -> Result<Image, Failure> {
         let mesh = mesh(moments[k].clone(), domain, options)?;
         let bodies = scenery::sharp(&domain, std::iter::once((drawn, &mesh)));
         let particles = ParticlesView { positions: Points::new(&[], &[], &[]), values: &[], radius: 0.0 };
         let moving = Moving { meshes: &scenery::views(&bodies), particles, balls: false };
-        Ok(still.frame_with(&moving, &Caption { time: times[k], step: None }))
+        Ok(still.frame_with(&moving, &Caption { time: times[k], every, step: None }))
     };
     target.write(&(0..times.len()).collect::<Vec<_>>(), &picture)?;
     let (width, height) = options.size;
@@ -172,7 +173,7 @@ fn seen(options: &Render, domain: &Aabb) -> Result<(Camera, Drawn), Failure> {
     let camera = camera(options, domain)?;
     let drawn = match &options.cut {
         None | Some(CutFlag::None) => Drawn::Whole,
-        Some(CutFlag::Plane(plane)) => Drawn::Open(half_towards_eye(plane, &camera)),
+        Some(CutFlag::Plane(plane)) => opened_by(half_towards_eye(plane, &camera), domain.corners()),
         Some(CutFlag::Auto) => {
             return Err(Failure::usage(
                 "--cut auto opens what hides a fluid, and a solid alone hides none: choose a plane, as in --cut y=0",

@@ -34,6 +34,7 @@ use frames::Frames;
 use goal::{Begin, Goal, Pace};
 use probes::Probes;
 use rfm::lower::Scene;
+use rfm::render::digits_of_time;
 use rfm::sph::{Simulation, short_time};
 use rfm::{Error, Experiment, Program};
 use stop::{NoRoom, Stop};
@@ -228,7 +229,8 @@ impl Recording<'_> {
                 return Ok(Err(Stop::NoRoom(crushed)));
             }
             let speed = simulation.speed();
-            let mut message = format!("t = {:.3} s, {speed:.2} m/s", simulation.time());
+            let digits = digits_of_time(self.experiment.scene().run.save_every);
+            let mut message = format!("t = {:.digits$} s, {speed:.2} m/s", simulation.time());
             if let Some(iterations) = simulation.iterations() {
                 message += &format!(", {iterations} iterations");
             }

@@ -67,6 +67,8 @@ pub(in crate::cli) struct Pictures {
     moving: Vec<(Drawn, Mesh)>,
     domain: Aabb,
     radius: f64,
+    /// The simulated time between frames, s.
+    every: f64,
     bodies: Vec<Body>,
     /// How the surface of the fluid is drawn in place of the particles, and the plane that cuts it open.
     surface: Option<(Surface, Option<Cut>)>,
@@ -92,7 +94,8 @@ impl Pictures {
         let title = title(look, experiment, &opened);
         // a fall is stopped on its way, what drives a fluid otherwise is not
         let share = if experiment.typical_speed() > 0.0 { FASTEST } else { 1.0 };
-        let fastest = share * experiment.speed_scale();
+        let stated = experiment.scene().picture.fastest;
+        let fastest = stated.unwrap_or(share * experiment.speed_scale());
         let body = |(solid, drawn): (&Solid, Drawn)| {
             let near = (!solid.moves() && solid.has_many_leaves()).then(|| solid.surface(domain));
             Body { solid: solid.clone(), drawn, near }
@@ -109,6 +112,7 @@ impl Pictures {
             moving: moving(&domain, &bodies, meshes),
             domain,
             radius: 0.5 * experiment.parameters().spacing(),
+            every: experiment.scene().run.save_every,
             bodies,
             surface: look.surface.map(|surface| (surface, plane(look, experiment, &camera))),
             colours_end: look.surface.is_none().then_some(fastest),
@@ -143,7 +147,8 @@ impl Pictures {
             values: &speeds,
             radius: self.radius,
         };
-        let moment = render::Caption { time: simulation.time(), step: Some(simulation.steps()) };
+        let moment =
+            render::Caption { time: simulation.time(), every: self.every, step: Some(simulation.steps()) };
         let mut meshes = scenery::views(&self.moving);
         let water = self.water(simulation)?;
         if let (Some((surface, cut)), Some(water)) = (self.surface, &water) {
@@ -243,13 +248,22 @@ fn opened(look: Look<'_>, experiment: &Experiment, meshes: &[Mesh]) -> Result<Ve
         (Some(CutFlag::Auto), _) | (None, Opening::Automatic) => None,
     };
     let samples = if fixed.is_none() { fluid_samples(experiment) } else { Vec::new() };
+    let until = experiment.scene().run.until;
+    let by_plane = |cut, body: &experiment::Body, mesh: &Mesh| match body.solid.moves() {
+        false => scenery::opened_by(cut, mesh.positions.iter().copied()),
+        true => match body.solid.between(0.0, until).bounds().aabb() {
+            Some(all_its_places) => scenery::opened_by(cut, all_its_places.corners()),
+            None => Drawn::Open(cut),
+        },
+    };
     let drawn = |((name, body), mesh): ((&&str, &experiment::Body), &Mesh)| match fixed {
         _ if is_hidden(name) => Drawn::Hidden,
-        _ if is_glass(name) => Drawn::Glass(fixed.flatten()),
+        _ if is_glass(name) => match fixed.flatten() {
+            Some(cut) => scenery::glass(by_plane(cut, body, mesh)),
+            None => Drawn::Glass(None),
+        },
         Some(None) => Drawn::Whole,
-        // where a body that moves will be is not known yet
-        Some(Some(cut)) if body.solid.moves() => Drawn::Open(cut),
-        Some(Some(cut)) => scenery::opened_by(cut, mesh),
+        Some(Some(cut)) => by_plane(cut, body, mesh),
         None => out_of_the_way(&small, name, mesh, &samples),
     };
     Ok(names.iter().zip(experiment.bodies()).zip(meshes).map(drawn).collect())

@@ -219,7 +219,8 @@ pub(super) fn print(summary: &Summary, frames: &Frames, probes: &Probes) {
     if let Some(end) = frames.pale(summary.max_speed) {
         let end = significant(end, 2);
         say!(
-            "the pictures' colours end at {end} m/s, and the fluid stayed far below that: rfm render {folder} fits them"
+            "the pictures' colours end at {end} m/s, and the fluid stayed far below that: rfm render {folder} fits them, or \
+             `picture {{ fastest: … }}` in the scene states where they end"
         );
     }
 }

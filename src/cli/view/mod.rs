@@ -78,6 +78,15 @@ pub(super) fn run(shared: &Shared, options: &View) -> Result<(), Failure> {
 
 /// Writes the page of a run.
 fn save(shared: &Shared, run: &SavedRun, target: &Path) -> Result<(), Failure> {
+    if target == Path::new("-") {
+        if shared.json {
+            return Err(Failure::usage(
+                "--save - writes the page to standard output, and --json its figures: name a file",
+            ));
+        }
+        run.write(&mut std::io::stdout().lock())?;
+        return Ok(());
+    }
     let mut sizes = None;
     output::write(target, |out| {
         sizes = Some(run.write(out)?);

@@ -28,7 +28,7 @@ pub(in crate::cli) struct View {
     /// Cells of the obstacle's mesh along its longest side
     #[arg(long, value_name = "N", default_value_t = 64)]
     pub mesh_cells: usize,
-    /// Write one file that shows the run in any browser, and open nothing
+    /// Write one file that shows the run in any browser, and open nothing; - is standard output
     #[arg(long, help_heading = "Runs", value_name = "FILE")]
     pub save: Option<PathBuf>,
     /// Only these frames of a run, counted from 0; B is the first that is left out [default: all]

@@ -248,6 +248,8 @@ pub struct Picture {
     pub zoom: Option<f64>,
     /// What is taken away of obstacles.
     pub cut: Opening,
+    /// The speed at the end of the colours, m/s; `None`: one that follows from the scene.
+    pub fastest: Option<f64>,
     /// The names of obstacles that are not drawn.
     pub hide: Vec<String>,
     /// The names of obstacles that are drawn clear.

@@ -24,6 +24,8 @@ declare_keys! {
             "how many times as large as if the whole box were seen, 0.05 … 20";
         CUT = "cut", Words(&["auto", "none"]), Text("auto"),
             "the part of the obstacles that is taken away: `y <= 0.5`, `auto` or `none`";
+        FASTEST = "fastest", Number(Dimension::SPEED, Bound::Positive), Text("from the height of the fall"),
+            "the speed that has the last of the colours, so that pictures of several runs compare";
         HIDE = "hide", Other, Text("none"),
             "obstacles that are not drawn, by their names";
         GLASS = "glass", Other, Text("none"),
@@ -45,9 +47,10 @@ impl<'a> Lowering<'a> {
             Some((_, value)) => self.opening(value)?,
             None => Opening::default(),
         };
+        let fastest = self.stated_number(&block, &keys::FASTEST)?;
         let hide = self.obstacles(&block, keys::HIDE.name, bodies)?;
         let glass = self.obstacles(&block, keys::GLASS.name, bodies)?;
-        Some(Picture { camera, look_at, zoom, cut, hide, glass })
+        Some(Picture { camera, look_at, zoom, cut, fastest, hide, glass })
     }
 
     /// Reads the names of obstacles: one, or a list of them.

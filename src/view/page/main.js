@@ -213,7 +213,7 @@ class Viewer {
     scrub.max = timeline.last;
     scrub.value = timeline.place;
     const frames = timeline.frames.length;
-    byId("time").textContent = frames ? `${timeline.time.toFixed(timeline.duration < 1 ? 4 : 3)} s · ${Math.floor(timeline.place + 1e-9) + 1}/${frames}` : "";
+    byId("time").textContent = frames ? `${timeline.timeText(timeline.duration < 1 ? 4 : 3)} s · ${Math.floor(timeline.place + 1e-9) + 1}/${frames}` : "";
   }
 
   // ---- the picture
@@ -393,7 +393,7 @@ class Viewer {
     const labels = element("canvas", { width: canvas.width, height: canvas.height });
     const view = camera.view();
     const seen = { view, all: times(camera.projection([canvas.width / ratio, canvas.height / ratio], whole), view) };
-    const caption = [this.setting.title].concat(timeline.frames.length ? [`t = ${timeline.time.toFixed(3)} s`] : []);
+    const caption = [this.setting.title].concat(timeline.frames.length ? [`t = ${timeline.timeText(3)} s`] : []);
     drawOverlay(labels.getContext("2d"), [canvas.width, canvas.height], ratio, look, camera, seen, caption);
     context.drawImage(labels, 0, 0);
     this.changed();

@@ -42,6 +42,13 @@ class Timeline {
     return this.frames.length ? this.frames[this.last].time - this.frames[0].time : 0;
   }
 
+  /** The shown time in words, with the digits that tell two frames apart, and `least` at least. */
+  timeText(least) {
+    const every = this.duration / Math.max(this.last, 1);
+    const digits = every > 0 ? 1 - Math.floor(Math.log10(every)) : least;
+    return this.time.toFixed(clamp(digits, least, 9));
+  }
+
   add(frame) {
     this.frames.push(frame);
     this.bytes += bytesOf(frame);
