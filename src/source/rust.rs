@@ -6,7 +6,7 @@ use super::language::RUST;
 use super::operations::{Names, Operation, WEIGHTED_FIELDS};
 use super::program::{Program, Question};
 use super::statements::{Part, Statements, Writer};
-use super::{File, Math, OpenParam, SourceError};
+use super::{File, Math, OpenParam, PARAMS, SourceError};
 use crate::ir::Forms;
 use crate::precision::Precision;
 
@@ -67,7 +67,7 @@ impl RustFile<'_> {
         if params.is_empty() {
             return Vec::new();
         }
-        let mut lines = vec![String::new(), "/// The params of the file, in SI units.".into()];
+        let mut lines = vec![String::new(), format!("/// {PARAMS}")];
         lines.push("#[allow(non_camel_case_types)]".into());
         lines.push("#[derive(Debug, Clone, Copy, PartialEq)]".into());
         lines.push(format!("pub struct {prefix}_params {{"));

@@ -6,7 +6,7 @@ use super::language::{self, Language};
 use super::operations::{Names, Operation, WEIGHTED_FIELDS};
 use super::program::{Program, Question};
 use super::statements::{Part, Statements, Writer};
-use super::{File, Math, OpenParam, SourceError};
+use super::{File, Math, OpenParam, PARAMS, SourceError};
 use crate::ir::Forms;
 use crate::precision::Precision;
 
@@ -94,7 +94,8 @@ fn params(file: &File<'_>, shader: &Shader) -> Vec<String> {
     let fields: Vec<_> = file.params.iter().map(described).collect();
     let mut lines = vec![
         String::new(),
-        "// The params of the file, in SI units, with the values that it gives them.".into(),
+        format!("// {PARAMS}"),
+        "// Here they have the values that the file gives them.".into(),
     ];
     lines.extend((shader.params)(&format!("{}_params", file.prefix), &fields));
     lines

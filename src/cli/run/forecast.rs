@@ -1,4 +1,4 @@
-//! `rfm run --dry-run`: what a run would cost, in less than a second.
+//! `rfm run --dry-run`: what a run would cost, in less than a second unless many obstacles need programs and maps.
 //!
 //! A large scene is not seeded: a few steps of the same scene with larger particles are measured, and scaled up.
 

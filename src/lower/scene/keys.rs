@@ -131,9 +131,12 @@ impl<'a> Lowering<'a> {
                     .help(format!("its keys are {}", known.join(", ")))
                     .suggest(&key.text, known.iter().copied());
                 let own = foreign::key(&key.text);
+                // a word of other programs may be a key of a block here
+                let literal = blocks_with(&key.text, declared);
+                let own = own.filter(|_| literal.is_empty());
                 let elsewhere = own.filter(|own| known.contains(own));
                 let inner_key = own.unwrap_or(key.text.as_str());
-                let inner = blocks_with(inner_key, declared);
+                let inner = own.map_or(literal, |own| blocks_with(own, declared));
                 let absent = ABSENT
                     .iter()
                     .find(|(block, keys, _)| *block == what && keys.contains(&key.text.as_str()));
@@ -143,8 +146,10 @@ impl<'a> Lowering<'a> {
                         .help(format!("`{}` is called `{own}` here", key.text))
                         .edit(key.span, &key.text, own, false),
                     (None, [block, ..]) => diagnostic.help(format!(
-                        "it is a key of {}: write `{block} {{ {inner_key}: … }}`",
-                        listed(&inner)
+                        "it is a key of {}: write `{block}{} {{ {inner_key}: … }}`",
+                        listed(&inner),
+                        // a probe must have a name
+                        if *block == "probe" { " gauge" } else { "" }
                     )),
                     (None, []) if is_outer => diagnostic.help(format!(
                         "it is a key of the scene: write `{}: …` outside of this block",

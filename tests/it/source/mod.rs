@@ -264,6 +264,7 @@ fn params_that_stay_open_give_the_values_of_params_that_were_set() {
     let solid = opened.solid_with("s", Engine::Interpreter).unwrap();
     let options = Options { params, ..exact("s") };
     let text = source::write(&solid, Target::C, &options).unwrap().text;
+    assert!(text.contains("Nothing checks them against the ranges"), "{text}");
     assert!(text.contains("double side;") && !text.contains("double n;") && !text.contains("double unused;"));
     if !is_here("gcc") {
         return;

@@ -93,7 +93,10 @@ impl Fractions {
     fn near<'a>(&'a self, lattice: &'a Lattice, within: &Aabb) -> Near<'a> {
         // places on the walls of the box are moved inwards
         let asked = within.grown(BESIDE_WALL * lattice.step.max_element());
-        let may_fill = |body: &&dyn Walls| !(body.range(&asked).hi < 0.0);
+        let may_fill = |body: &&dyn Walls| {
+            let most = body.range(&asked).hi;
+            most >= 0.0 || most.is_nan()
+        };
         let bodies = self.bodies.iter().map(|body| &**body as &dyn Walls);
         Near { bodies: bodies.filter(may_fill).collect(), lattice }
     }
