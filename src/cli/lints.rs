@@ -7,7 +7,7 @@ use rfm::experiment::{self, Body, Taken};
 use rfm::geom::{Aabb, to_thousandths};
 use rfm::glam::DVec3;
 use rfm::ir::Node;
-use rfm::lower::{NamedSolid, Obstacle, Scene};
+use rfm::lower::{NamedSolid, Scene};
 use rfm::solid::{Break, Breakage, ProgramKind, ThinPart, Uneven};
 use rfm::syntax::ast::Item;
 use rfm::{Engine, Error, Experiment, Program, Solid};
@@ -220,11 +220,15 @@ pub(super) fn of_scenes(
 ) -> Result<Vec<Diagnostic>, Error> {
     let mut found = Vec::new();
     for scene in &program.module().scenes {
-        if scene.obstacles.len() > MOST_OBSTACLES {
-            continue;
-        }
-        let experiment = match Experiment::new(program, &scene.name, engine) {
+        let is_crowded = scene.obstacles.len() > experiment::MOST_OBSTACLES;
+        let compiled = match is_crowded {
+            false => Experiment::new(program, &scene.name, engine),
+            true => Experiment::without_obstacles(program, &scene.name, engine),
+        };
+        let experiment = match compiled {
             Ok(experiment) => experiment,
+            // perhaps an obstacle that moves says how fast the fluid will be: the run tells what is missing
+            Err(Error::Diagnostics(_)) if is_crowded => continue,
             Err(Error::Diagnostics(refusal)) => {
                 // solids report tolerances themselves
                 found.extend(refusal.list.into_iter().filter(|refusal| refusal.code != Code::TOLERANCE));
@@ -232,16 +236,20 @@ pub(super) fn of_scenes(
             }
             Err(other) => return Err(other),
         };
+        if is_crowded {
+            found.extend(among_many(program, scene, &experiment)?);
+            continue;
+        }
         let spacing = experiment.parameters().spacing();
         let (outside, obstacles) = experiment
             .bodies()
             .split_at(usize::from(scene.container.is_some()).min(experiment.bodies().len()));
         let outside = outside.first().map(|body| &body.solid);
         for (k, (obstacle, body)) in scene.obstacles.iter().zip(obstacles).enumerate() {
-            found.extend(out_of_reach((scene, spacing), obstacle, (&body.solid, outside)));
-            let wall = wall_limit(scene, usize::from(outside.is_some()) + k);
+            found.extend(experiment::out_of_reach((scene, spacing), obstacle, (&body.solid, outside)));
+            let wall = experiment::wall_limit(scene, usize::from(outside.is_some()) + k);
             let search = (obstacle.shape, [wall * spacing, spacing], scene.domain);
-            found.extend(too_thin(
+            found.extend(experiment::too_thin(
                 (scene, spacing),
                 obstacle,
                 wall,
@@ -267,6 +275,28 @@ fn of_fluid(experiment: &Experiment) -> Vec<Diagnostic> {
         found.extend(in_obstacles(scene, &experiment.fluid().at(0.0), &solids));
     }
     found
+}
+
+/// The same for a scene with so many obstacles that each is only asked whether it takes samples of the fluid. The
+/// experiment is that of the scene without them.
+fn among_many(program: &Program, scene: &Scene, experiment: &Experiment) -> Result<Vec<Diagnostic>, Error> {
+    let mut found = experiment.foreseen();
+    if found.iter().any(|diagnostic| diagnostic.severity == Severity::Error) {
+        return Ok(found);
+    }
+    let mut bodies: Vec<Solid> = experiment.bodies().iter().map(|body| body.solid.at(0.0)).collect();
+    let mut operations = 0;
+    for obstacle in &scene.obstacles {
+        // to compile them all would take longer than the few places at which each is asked
+        let solid = program.compile(&obstacle.name, obstacle.shape, Engine::Interpreter)?.at(0.0);
+        operations += solid.graph(ProgramKind::Value).0.len();
+        if operations > MOST_OPERATIONS_OF_MANY {
+            return Ok(found);
+        }
+        bodies.push(solid);
+    }
+    found.extend(in_obstacles(scene, &experiment.fluid().at(0.0), &bodies));
+    Ok(found)
 }
 
 /// Messages about the part of a fluid's shape that lies in obstacles or outside the container: a warning if
@@ -307,34 +337,7 @@ fn in_obstacles(scene: &Scene, fluid: &Solid, bodies: &[Solid]) -> Vec<Diagnosti
     told.collect()
 }
 
-/// A warning if no fluid can meet an obstacle.
-fn out_of_reach(
-    (scene, spacing): (&Scene, f64),
-    obstacle: &Obstacle,
-    (solid, outside): (&Solid, Option<&Solid>),
-) -> Option<Diagnostic> {
-    if solid.graph(ProgramKind::Value).0.len() > MOST_OPERATIONS {
-        return None;
-    }
-    let is_out = experiment::is_out_of_reach(solid, outside, &scene.domain, scene.run.until, DEPTH * spacing);
-    is_out.then(|| {
-        let (room, help) = match &scene.container {
-            Some(container) => (
-                format!("the container `{}`", container.name),
-                "where its face lies on the container's, both act on the fluid: let the container reach beyond it",
-            ),
-            None => ("the box".to_owned(), "move it into the box, or make the box larger"),
-        };
-        let message = format!("obstacle `{}` lies outside {room}: no fluid can be in its place", obstacle.name);
-        Diagnostic::warning(Code::OUT_OF_REACH, obstacle.span, message).help(help)
-    })
-}
-
-/// Part of the spacing by which an obstacle may reach into the room and count as outside of it.
-const DEPTH: f64 = 0.5;
-
-/// For obstacles with more operations it is not tested what they take of the fluid, and whether the fluid can
-/// meet them: that would take seconds.
+/// For bodies with more operations together it is not tested what they take of the fluid: that would take seconds.
 const MOST_OPERATIONS: usize = 2000;
 
 /// A fluid gets a warning if at least this part of its shape lies in obstacles.
@@ -346,7 +349,7 @@ pub(super) fn of_experiment(experiment: &Experiment, searches: &mut Searches) ->
     let (scene, spacing) = (experiment.scene(), experiment.parameters().spacing());
     let sources = experiment.program().sources().clone();
     let mut found = Diagnostics { list: Vec::new(), sources };
-    if scene.obstacles.len() > MOST_OBSTACLES {
+    if scene.obstacles.len() > experiment::MOST_OBSTACLES {
         return found;
     }
     let container = scene.container.iter().map(|container| (&container.name, container.span, None));
@@ -364,98 +367,18 @@ pub(super) fn of_experiment(experiment: &Experiment, searches: &mut Searches) ->
         if let Some(obstacle) = obstacle {
             let outside = scene.container.as_ref().and_then(|_| experiment.bodies().first());
             let solids = (&body.solid, outside.map(|outside| &outside.solid));
-            found.list.extend(out_of_reach((scene, spacing), obstacle, solids));
-            let wall = wall_limit(scene, number);
+            found.list.extend(experiment::out_of_reach((scene, spacing), obstacle, solids));
+            let wall = experiment::wall_limit(scene, number);
             let parts =
                 searches.thin_parts(&body.solid, (obstacle.shape, [wall * spacing, spacing], scene.domain));
-            found.list.extend(too_thin((scene, spacing), obstacle, wall, parts));
+            found.list.extend(experiment::too_thin((scene, spacing), obstacle, wall, parts));
         }
     }
     found
 }
 
-/// Walls that are thinner than this part of the spacing are reported. A particle stays half a spacing away
-/// from each face: through such a wall it is nearer to those on the other side than to its own second
-/// neighbours.
-const THIN_WALL: f64 = 0.5;
-
-/// Walls whose load a probe measures are reported below this part of the spacing. The kernels of particles
-/// before a thinner wall reach beyond it, where nothing presses back: with still water on one side loads are
-/// 5 % too large at 1.4 spacings.
-const LOADED_WALL: f64 = 1.5;
-
-/// Walls and gaps as wide as this part of the limit are wide enough.
-const ALMOST: f64 = 0.999;
-
-/// Scenes with more obstacles are not looked at.
-const MOST_OBSTACLES: usize = 50;
-
-/// Messages about the thinnest wall and the thinnest gap of an obstacle.
-fn too_thin(
-    scene: (&Scene, f64),
-    obstacle: &Obstacle,
-    of_wall: f64,
-    [wall, gap]: [Option<ThinPart>; 2],
-) -> impl Iterator<Item = Diagnostic> {
-    [(wall, "wall", of_wall), (gap, "gap", 1.0)]
-        .into_iter()
-        .filter_map(move |(part, what, of_spacing)| thin(scene, obstacle, &part?, (what, of_spacing)))
-}
-
-fn thin(
-    (scene, spacing): (&Scene, f64),
-    obstacle: &Obstacle,
-    part: &ThinPart,
-    (what, of_spacing): (&str, f64),
-) -> Option<Diagnostic> {
-    let spacings = part.thickness / spacing;
-    // of a search that ends a little below the limit
-    if spacings > ALMOST * of_spacing {
-        return None;
-    }
-    let is_load = what == "wall" && spacings >= THIN_WALL;
-    let less = match () {
-        () if is_load => format!("{spacings:.1} times"),
-        () if of_spacing != 1.0 => "less than half of".to_owned(),
-        () => "less than".to_owned(),
-    };
-    let consequence = match (is_load, what) {
-        (true, _) => {
-            "; loads on it by a fluid on one side are too large, by 5 % at 1.4 times, 15 % at 1, 40 % at 0.7"
-        }
-        (false, "wall") => ", so that fluids on its two sides push one another through it",
-        (false, _) => ", so that less flows through it than should",
-    };
-    let message = format!(
-        "a {what} of obstacle `{}` is {:.2e} m wide at {}: {less} the {spacing:.2e} m between particles{consequence}",
-        obstacle.name,
-        part.thickness,
-        point(part.at)
-    );
-    // so that it is shown
-    let needed = rounded_down(part.thickness / of_spacing);
-    let number = scene.fluid.particles.map_or_else(String::new, |n| {
-        format!(", that of {:.1e} particles,", n as f64 * (spacing / needed).powi(3))
-    });
-    let help = format!("a spacing of {needed:.1e} m{number} is small enough; or make the {what} wider");
-    Some(Diagnostic::warning(Code::THIN_FOR_PARTICLES, obstacle.span, message).help(help))
-}
-
-/// A length, m, rounded down to two digits.
-fn rounded_down(length: f64) -> f64 {
-    let unit = 10_f64.powf(length.log10().floor() - 1.0);
-    // an exact number of units may lie a rounding error below it
-    (length / unit * (1.0 + 1e-9)).floor() * unit
-}
-
-/// The part of the spacing below which a wall of a body, given by its number, is reported.
-fn wall_limit(scene: &Scene, number: usize) -> f64 {
-    let is_loaded = scene
-        .probes
-        .iter()
-        .any(|probe| matches!(probe.measured, rfm::sph::Probe::Force { obstacle, .. } if obstacle == number));
-    if is_loaded { LOADED_WALL } else { THIN_WALL }
-}
+/// The room among many obstacles is not looked at if they have more operations together: that would take seconds.
+const MOST_OPERATIONS_OF_MANY: usize = 100_000;
 
 fn point(p: DVec3) -> String {
     let DVec3 { x, y, z } = to_thousandths(p);

@@ -21,6 +21,7 @@ mod filling;
 mod fingerprint;
 mod layers;
 mod mean;
+mod misfits;
 mod out_of_reach;
 mod parameters;
 mod probes;
@@ -47,6 +48,7 @@ pub use deviation::{Deviation, Deviations};
 pub use every::Every;
 pub use filling::spacing;
 pub use mean::Mean;
+pub use misfits::{MOST_OBSTACLES, out_of_reach, too_thin, wall_limit};
 pub use out_of_reach::is_out_of_reach;
 pub use parameters::TimeStep;
 pub use probes::probe_column;
@@ -82,6 +84,17 @@ impl Experiment {
     /// available, [`Error::Diagnostics`] if the fluid's parameters do not fit together.
     pub fn new(program: &Program, scene: &str, engine: Engine) -> Result<Self, Error> {
         Self::of_scene(program.clone(), program.scene(scene)?.clone(), engine)
+    }
+
+    /// A scene without its obstacles, and without what is measured at them. It shows quickly whether a fluid among very
+    /// many obstacles has room.
+    ///
+    /// # Errors
+    /// Those of [`Experiment::new`].
+    pub fn without_obstacles(program: &Program, scene: &str, engine: Engine) -> Result<Self, Error> {
+        let scene = program.scene(scene)?.clone();
+        let scene = Scene { obstacles: Vec::new(), probes: Vec::new(), ..scene };
+        Self::of_scene(program.clone(), scene, engine)
     }
 
     fn of_scene(program: Program, scene: Scene, engine: Engine) -> Result<Self, Error> {

@@ -38,6 +38,38 @@ pub(super) const LEAST_ROOM: f64 = 1.03;
 /// The least part of a fluid outside the box that is worth a warning: less is an edge between samples.
 const PART_OUTSIDE: f64 = 0.02;
 
+/// Solids that are asked at many places whether these lie in one of them. Bounds answer most of the questions: many
+/// solids are small.
+pub(super) struct Crowd<'a> {
+    solids: Vec<(&'a Solid, Option<Aabb>)>,
+}
+
+/// So few solids are asked themselves: to find the bounds of one may take longer than all that is asked of it.
+const FEW: usize = 4;
+
+impl<'a> Crowd<'a> {
+    pub fn of(solids: impl Iterator<Item = &'a Solid>) -> Self {
+        let solids: Vec<&Solid> = solids.collect();
+        let is_crowd = solids.len() > FEW;
+        let bounds = |solid: &Solid| if is_crowd { solid.bounds().aabb() } else { None };
+        Self { solids: solids.into_iter().map(|solid| (solid, bounds(solid))).collect() }
+    }
+
+    /// Whether a place is proven to lie outside of all.
+    pub fn is_free(&self, at: DVec3) -> bool {
+        let is_outside = |solid: &Solid| solid.omega(at) < 0.0;
+        let mut solids = self.solids.iter();
+        solids.all(|(solid, bounds)| bounds.is_some_and(|bounds| !bounds.contains(at)) || is_outside(solid))
+    }
+
+    /// Whether a place lies in one of them, or on its surface.
+    pub fn takes(&self, at: DVec3) -> bool {
+        let is_in = |solid: &Solid| solid.omega(at) >= 0.0;
+        let mut solids = self.solids.iter();
+        solids.any(|(solid, bounds)| bounds.is_none_or(|bounds| bounds.contains(at)) && is_in(solid))
+    }
+}
+
 /// The rest of a box without slabs along its faces in which a field is proven to be negative; the whole box
 /// if the field is negative in all of it. For a half-space such as `z <= 0.5`, the part inside the box
 /// remains.
@@ -202,8 +234,9 @@ impl Experiment {
         let Ok(bounds) = self.extent() else { return false };
         let within = bounds.intersection(&self.scene.domain);
         let mut wet = samples(&within).filter(|at| self.fluid.omega(*at) > 0.0).peekable();
+        let bodies = Crowd::of(bodies.iter().map(|body| &body.solid));
         // a film that no sample meets is not known to be covered
-        wet.peek().is_some() && wet.all(|at| bodies.iter().any(|body| body.solid.omega(at) > 0.0))
+        wet.peek().is_some() && wet.all(|at| bodies.takes(at))
     }
 
     /// The size of the box around the fluid's shape within the domain, m.
@@ -270,11 +303,12 @@ impl Experiment {
     /// The part of the box, m³, that no body takes at a time, s, found by samples.
     pub fn free_volume(&self, time: f64) -> f64 {
         let bodies: Vec<_> = self.bodies.iter().map(|body| body.solid.at(time)).collect();
+        let bodies = Crowd::of(bodies.iter());
         let domain = self.scene.domain;
         let (mut free, mut all) = (0.0, 0.0);
         for at in samples(&domain) {
             all += 1.0;
-            free += f64::from(u8::from(bodies.iter().all(|body| body.omega(at) < 0.0)));
+            free += f64::from(u8::from(bodies.is_free(at)));
         }
         domain.volume() * free / all
     }
@@ -286,12 +320,12 @@ impl Experiment {
     pub fn estimated_particles(&self) -> Result<f64, Error> {
         let region = self.reach()?.intersection(&self.scene.domain);
         let (mut fluid, mut shape, mut all) = (0.0, 0.0, 0.0);
+        let bodies = Crowd::of(self.bodies.iter().map(|body| &body.solid));
         for at in samples(&region) {
             all += 1.0;
             if self.fluid.omega(at) > 0.0 {
                 shape += 1.0;
-                let wet = self.bodies.iter().all(|body| body.solid.omega(at) < 0.0);
-                fluid += f64::from(u8::from(wet));
+                fluid += f64::from(u8::from(bodies.is_free(at)));
             }
         }
         let cell = self.parameters.spacing().powi(3);
@@ -348,6 +382,9 @@ pub(super) fn part_in_box(shape: &Solid, domain: &Aabb) -> Option<Aabb> {
     }
 }
 
+/// Most samples of which one is taken.
+const SPARSEST: usize = 30;
+
 /// What obstacles take of a fluid's shape.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Taken {
@@ -360,13 +397,13 @@ pub struct Taken {
 /// What obstacles take of a fluid's shape within a box; `None` if no sample meets the shape.
 pub fn taken_by_obstacles(fluid: &Solid, obstacles: &[Solid], domain: &Aabb) -> Option<Taken> {
     let within = part_in_box(fluid, domain).filter(|within| !is_flat(within))?;
-    let is_taken = |p: DVec3| obstacles.iter().any(|obstacle| obstacle.omega(p) >= 0.0);
+    let crowd = Crowd::of(obstacles.iter());
     // fewer places for many obstacles
     let every = 1 + obstacles.len() / 4;
     let (mut all, mut taken) = (0.0, 0.0);
-    for p in samples(&within).step_by(every).filter(|p| fluid.omega(*p) > 0.0) {
+    for p in samples(&within).step_by(every.min(SPARSEST)).filter(|p| fluid.omega(*p) > 0.0) {
         all += 1.0;
-        taken += f64::from(u8::from(is_taken(p)));
+        taken += f64::from(u8::from(crowd.takes(p)));
     }
     if all == 0.0 {
         return None;
@@ -412,13 +449,13 @@ pub(super) fn has_surface<'a>(scene: &Scene, fluid: &Solid, bodies: impl Iterato
         return true;
     }
     let bodies: Vec<Solid> = bodies.map(|body| body.at(0.0)).collect();
+    let bodies = Crowd::of(bodies.iter());
     let (min, size) = (scene.domain.min, scene.domain.size());
     let (mut dry, mut wet) = (0.0, 0.0);
     let is_dry = |dry: f64, wet: f64| dry >= (LEAST_ROOM - 1.0) * wet;
     for k in 1..=MOST_SAMPLES {
         let at = min + size * (f64::from(k) * SPREAD).fract();
-        let is_free = bodies.iter().all(|body| body.omega(at) < 0.0);
-        if !is_free {
+        if !bodies.is_free(at) {
             continue;
         }
         *(if fluid.omega(at) > 0.0 { &mut wet } else { &mut dry }) += 1.0;

@@ -3,7 +3,7 @@
 use rfm::geom::Aabb;
 use rfm::glam::DVec3;
 use rfm::solid::{Breakage, ThinPart};
-use rfm::{Engine, Program, Solid};
+use rfm::{Engine, Experiment, Program, Solid};
 
 use crate::random::Random;
 use crate::tool::{rfm, rfm_reading, root};
@@ -325,6 +325,45 @@ fn a_run_tells_of_what_its_fluid_meets() {
         assert!(at_start.contains(&format!("warning[{code}]")), "{at_start}");
         let later = end("2ms");
         assert!(!later.contains(code), "{later}");
+    }
+}
+
+/// A program that embeds the library hears of them as well.
+#[test]
+fn an_experiment_tells_of_obstacles_that_its_particles_do_not_fit() {
+    for (case, code) in [("obstacle_outside_the_box", "W0519"), ("wall_thinner_than_the_spacing", "W0508")] {
+        let file = root().join(format!("tests/cases/scene_error/{case}.rfm"));
+        let program = Program::from_path(file).unwrap();
+        let scene = program.module().scenes[0].name.clone();
+        let found = Experiment::new(&program, &scene, Engine::Auto).unwrap().misfits();
+        assert!(
+            !found.list.is_empty() && found.list.iter().all(|message| message.code.0 == code),
+            "{found:?}"
+        );
+    }
+}
+
+/// Each of many obstacles would have a map of the box, but whether the fluid has room is told all the same.
+#[test]
+fn the_room_among_many_obstacles_is_looked_at() {
+    let posts: String = (0..64)
+        .map(|k| {
+            let at = format!("[{}, {}, 0]", 0.25 * f64::from(k % 8), 0.25 * f64::from(k / 8));
+            format!("obstacle {{ solid: cylinder(0.05, 1).move({at}) }}\n")
+        })
+        .collect();
+    for (shape, code) in [
+        ("ball([0.25, 0.25, 0.5], 0.04)", "error[E0502]"),
+        ("ball([0.25, 0.25, 0.5], 0.06)", "warning[W0501]"),
+        ("ball([9, 0, 0], 0.1)", "error[E0304]"),
+        ("z <= 0.5", ""),
+    ] {
+        let text = format!(
+            "rfm 1\nscene s {{\nbox {{ min: [-0.1, -0.1, 0], max: [2, 2, 1] }}\n\
+             fluid {{ shape: {shape}, particles: 500 }}\n{posts}}}\n"
+        );
+        let told = rfm_reading(root(), &["check", "-"], text.as_bytes()).stderr;
+        assert!(if code.is_empty() { told.is_empty() } else { told.contains(code) }, "{shape}: {told}");
     }
 }
 
