@@ -16,6 +16,7 @@ use rfm::mesh::{
     self, FORMATS, Grid, LengthUnit, Mesh, MeshError, Report, Resolution, dual_contouring, marching_cubes,
 };
 use rfm::solid::Bounds;
+use rfm::view;
 
 use crate::error::{not_read, refused};
 use crate::pool::{Threads, Watch, run_watched};
@@ -183,6 +184,25 @@ pub fn write_file(
     Ok(())
 }
 
+impl PyMesh {
+    /// Refuses to write a mesh without triangles.
+    fn holds_something(&self, py: Python<'_>) -> PyResult<()> {
+        if self.mesh.triangles.is_empty() {
+            let hidden = match self.count_thin_cells(py) {
+                // what is no refusal of the mesher comes from a signal
+                Err(error) if !error.is_instance_of::<PyValueError>(py) => return Err(error),
+                counted => counted.unwrap_or(0),
+            };
+            let reason = match hidden {
+                0 => "the solid is empty, or smaller than a cell".to_owned(),
+                n => format!("parts of the solid hide in {n} cells; mesh it with more"),
+            };
+            return Err(refused(format!("the mesh is empty: {reason}")));
+        }
+        Ok(())
+    }
+}
+
 #[pymethods]
 impl PyMesh {
     /// Places of the vertices: array of shape (n, 3), ``float64``, m.
@@ -242,7 +262,8 @@ impl PyMesh {
         self.report.max_distance
     }
 
-    /// Writes the mesh to a file; the ending chooses the format: .stl .ply .obj .vtp .glb .3mf.
+    /// Writes the mesh to a file; the ending chooses the format: .stl .ply .obj .vtp .glb .3mf,
+    /// or .html for a page that shows the mesh in a browser.
     ///
     /// Parameters
     /// ----------
@@ -250,7 +271,7 @@ impl PyMesh {
     /// ascii : bool
     ///     Write .stl as text.
     /// unit : str
-    ///     Unit of the numbers in the file: m, cm, mm, um, in or ft. Files .vtp and .glb are in metres.
+    ///     Unit of the numbers in the file: m, cm, mm, um, in or ft. Files .vtp, .glb and .html are in metres.
     #[pyo3(signature = (path, *, ascii=false, unit="m"))]
     fn save(&self, py: Python<'_>, path: PathBuf, ascii: bool, unit: &str) -> PyResult<()> {
         let Some(unit) = LengthUnit::named(unit) else {
@@ -259,8 +280,17 @@ impl PyMesh {
         };
         let ending =
             path.extension().map(|ending| ending.to_string_lossy().to_lowercase()).unwrap_or_default();
+        if ending == "html" {
+            if ascii || unit != LengthUnit::METRE {
+                return Err(PyValueError::new_err(".html files are pages, and always in metres"));
+            }
+            self.holds_something(py)?;
+            let title = path.file_stem().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
+            return py.detach(|| write_file(&path, |out| view::solid(&title, &self.mesh, out)));
+        }
         let Some(format) = FORMATS.iter().find(|format| format.ending == ending) else {
-            let known: Vec<String> = FORMATS.iter().map(|format| format!(".{}", format.ending)).collect();
+            let formats = FORMATS.iter().map(|format| format.ending);
+            let known: Vec<String> = formats.chain(["html"]).map(|ending| format!(".{ending}")).collect();
             return Err(PyValueError::new_err(format!(
                 "cannot tell the format of `{}`: the ending must be one of {}",
                 path.display(),
@@ -275,18 +305,7 @@ impl PyMesh {
         if format.only_metres && unit != LengthUnit::METRE {
             return Err(PyValueError::new_err(format!(".{ending} files are always in metres")));
         }
-        if self.mesh.triangles.is_empty() {
-            let hidden = match self.count_thin_cells(py) {
-                // what is no refusal of the mesher comes from a signal
-                Err(error) if !error.is_instance_of::<PyValueError>(py) => return Err(error),
-                counted => counted.unwrap_or(0),
-            };
-            let reason = match hidden {
-                0 => "the solid is empty, or smaller than a cell".to_owned(),
-                n => format!("parts of the solid hide in {n} cells; mesh it with more"),
-            };
-            return Err(refused(format!("the mesh is empty: {reason}")));
-        }
+        self.holds_something(py)?;
         py.detach(|| write_file(&path, |out| write(&self.mesh, unit, out)))
     }
 

@@ -165,11 +165,13 @@ impl PySimulation {
         let started = run(py, threads, || {
             let experiment = Experiment::new(file, scene, Engine::Auto)?;
             let start = experiment.start()?;
-            Ok((experiment, start))
+            let misfits = experiment.misfits();
+            Ok((experiment, start, misfits))
         })?;
-        let (experiment, start) = started.map_err(|error| raised(py, error))?;
+        let (experiment, start, misfits) = started.map_err(|error| raised(py, error))?;
         let Start { mut simulation, warnings, .. } = start;
         let mut found = experiment.warnings();
+        found.list.extend(misfits.list);
         found.list.extend(warnings.list);
         let recorders = run(py, threads, || recorders(&experiment, &mut simulation, None))??;
         let now = Mutex::new(Now::of(&simulation));

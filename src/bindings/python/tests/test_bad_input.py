@@ -189,6 +189,8 @@ def test_files_that_cannot_be_written(pawn, tmp_path):
         mesh.save(tmp_path / "pawn.xyz")
     with pytest.raises(ValueError, match="no text form"):
         mesh.save(tmp_path / "pawn.ply", ascii=True)
+    with pytest.raises(ValueError, match="always in metres"):
+        mesh.save(tmp_path / "pawn.html", unit="mm")
     with pytest.raises(FileNotFoundError):
         mesh.save(tmp_path / "none" / "pawn.stl")
     with pytest.raises(OSError):

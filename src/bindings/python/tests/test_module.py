@@ -56,7 +56,7 @@ def test_meshes_are_arrays(pawn, tmp_path):
     one = pawn.mesh(32, threads=1)
     assert np.array_equal(one.vertices, mesh.vertices) and np.array_equal(one.triangles, mesh.triangles)
     assert pawn.mesh(32, method="mc").closed and pawn.mesh(cell=0.1, no_slivers=True).closed
-    for ending in ("stl", "ply", "obj", "vtp", "glb", "3mf"):
+    for ending in ("stl", "ply", "obj", "vtp", "glb", "3mf", "html"):
         path = tmp_path / f"pawn.{ending}"
         mesh.save(path)
         assert path.stat().st_size > 1000

@@ -188,6 +188,14 @@ def test_bad_goals(drop):
         rfm.load(EXAMPLES / "pawn.rfm", particles=0)
 
 
+def test_obstacles_that_the_particles_do_not_fit_are_told():
+    text = """rfm 1
+        scene s { box { max: [1, 1, 1] }, fluid { shape: z <= 0.3, spacing: 0.06 }
+          obstacle { solid: box([0.4, 0, 0], [0.41, 1, 0.5]) }, obstacle { solid: ball([0.5, 0.5, 3], 0.2) } }"""
+    codes = {found.code for found in rfm.load(text).scene().warnings}
+    assert {"W0508", "W0519"} <= codes
+
+
 def test_an_end_by_numbers_is_an_error_and_final():
     # far too stiff for its step
     text = (EXAMPLES / "pawn.rfm").read_text().replace("stiffness: 3 J/kg", "stiffness: 3000000 J/kg")
