@@ -98,6 +98,11 @@ impl<'t> Slip<'t> {
         if matches!(last_word(line), "NOT" | "Not") {
             return Some(self.syntax("there is no operator `NOT`").help("write `not a`"));
         }
+        if self.found == "in"
+            && let Some(diagnostic) = self.fold_as_a_call()
+        {
+            return Some(diagnostic);
+        }
         if last_word(line) == "for" {
             return Some(
                 self.unexpected().at("`for` is written `any` here").help("write `any i in 0..6: …`"),

@@ -1,7 +1,7 @@
 //! Slips in the heads of items, folds and blocks.
 
 use super::super::foreign;
-use super::{Slip, fits, last_word};
+use super::{Slip, bracketed, fits, last_word};
 use crate::diagnostic::{Code, Diagnostic, Span};
 
 /// What begins a fold.
@@ -14,7 +14,7 @@ impl Slip<'_> {
             "|" => self.absolute_value(),
             "{" => self.function_in_braces(),
             "," => self.two_variables(),
-            "(" => self.function_by_let(),
+            "(" => self.fold_as_a_call().or_else(|| self.function_by_let()),
             "-" => self.name_with_a_dash(),
             "." => self.box_as_a_range(),
             "}" => self.block_without_a_key(),
@@ -56,6 +56,26 @@ impl Slip<'_> {
             let fold = &head[..length];
             self.unexpected()
                 .help(format!("a fold has one variable: write `{head}: {fold} {}: …`", second.trim()))
+        })
+    }
+
+    /// `any(i in 0..4, …)`, `sum(i in 0..4: …)` and `any(… for i in 0..4)`
+    pub(super) fn fold_as_a_call(&self) -> Option<Diagnostic> {
+        let line = self.on_its_line();
+        let open = if self.found == "(" { self.at } else { self.at - line.len() + line.rfind('(')? };
+        let fold = last_word(self.text[..open].trim_end());
+        let inner = bracketed(&self.text[open..])?;
+        let (head, body) = match inner.split_once(" for ") {
+            Some((body, head)) => (head.trim(), body.trim()),
+            None => {
+                let (head, body) = inner.split_at(inner.find([',', ':'])?);
+                (head.trim(), body[1..].trim())
+            }
+        };
+        let is_fold = FOLDS.contains(&fold) && head.contains(" in ") && fits(&[head]);
+        is_fold.then(|| {
+            let body = if fits(&[body]) { body } else { "…" };
+            self.unexpected().help(format!("a fold has no brackets: write `{fold} {head}: {body}`"))
         })
     }
 
