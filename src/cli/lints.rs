@@ -228,10 +228,12 @@ pub(super) fn of_scenes(
         let experiment = match compiled {
             Ok(experiment) => experiment,
             // perhaps an obstacle that moves says how fast the fluid will be: the run tells what is missing
-            Err(Error::Diagnostics(_)) if is_crowded => continue,
             Err(Error::Diagnostics(refusal)) => {
                 // solids report tolerances themselves
-                found.extend(refusal.list.into_iter().filter(|refusal| refusal.code != Code::TOLERANCE));
+                // perhaps an obstacle that was left out says how fast the fluid will be
+                let is_told =
+                    |code: Code| code != Code::TOLERANCE && !(is_crowded && code == Code::SCENE_MISSING);
+                found.extend(refusal.list.into_iter().filter(|refusal| is_told(refusal.code)));
                 continue;
             }
             Err(other) => return Err(other),

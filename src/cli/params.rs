@@ -36,13 +36,18 @@ fn table(path: &Path, text: &str) -> Result<Map<String, Value>, Failure> {
 
 /// The file and the line in which a name is given its value.
 fn place(path: &Path, text: &str, name: &str) -> String {
+    // a TOML file may have comments
+    let is_json = path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("json"));
+    let code = |line: &'_ str| -> String {
+        if is_json { line.to_string() } else { line.split('#').next().unwrap_or_default().to_string() }
+    };
     let is_given = |line: &str| {
         let bare = line.trim_start_matches([' ', '\t', '{', ',', '"', '\'']);
         let rest = bare.strip_prefix(name).map(|rest| rest.trim_start_matches([' ', '\t', '"', '\'']));
         rest.is_some_and(|rest| rest.starts_with(['=', ':']))
     };
     // members of an object may share a line, and then that line is the first one
-    match text.lines().position(|line| line.split(',').any(is_given)) {
+    match text.lines().position(|line| code(line).split(',').any(is_given)) {
         Some(before) => format!("{}:{}", path.shown(), before + 1),
         None => path.shown(),
     }

@@ -6,7 +6,7 @@ use glam::DVec3;
 
 use super::lowering::Lowering;
 use super::scene::declaration::{SceneKey, declare_keys, names};
-use super::scene::run::seconds_as_written;
+use super::scene::run::times_as_written;
 use super::scene::{AskedMean, Block, SceneProbe};
 use crate::diagnostic::{Code, Diagnostic};
 use crate::geom::Aabb;
@@ -87,7 +87,7 @@ impl<'a> Lowering<'a> {
             if let (Some(Some(every)), Some((_, value))) = (every, block.setting(keys::EVERY.name))
                 && every > around.until
             {
-                let [until, every] = [around.until, every].map(seconds_as_written);
+                let [until, every] = times_as_written([around.until, every]);
                 let message =
                     format!("a sample every {every} in a run of {until}: only its start is measured");
                 let help = "without this key there is a sample with every frame";

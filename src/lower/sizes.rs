@@ -1,7 +1,8 @@
 //! Sizes that do not fit one another: shapes of which nothing is left, walls that fill their shape, tori that
-//! cut themselves. The messages ask.
+//! cut themselves.
 
 use super::lowering::{Local, Lowering};
+use super::value::Value;
 use crate::diagnostic::{Code, Diagnostic, SourceId, Span};
 use crate::geom::Aabb;
 use crate::ir::{self, Node};
@@ -23,18 +24,15 @@ impl Lowering<'_> {
         let at = self.user_span(span);
         let call = self.scope.calls.last();
         let is_shell = call.is_some_and(|call| call.source == SourceId::Prelude && call.function == SHELL);
-        // bounds are found by search, and have rounding errors
-        let least = within.map_or(0.0, |within| within.size().min_element());
-        let narrowest: f64 = format!("{least:.3e}").parse().unwrap_or(least);
         let (message, help) = if is_shell {
             (
-                format!("a wall of {by} fills the shape, which is {narrowest} wide: nothing of it is hollow"),
-                format!("a thickness below {} leaves a hollow", narrowest / 2.0),
+                format!("a wall of {by} fills the shape: nothing of it is hollow"),
+                "less than half of the shape's thickness leaves a hollow",
             )
         } else {
             (
-                format!("nothing of the shape is left: it is {narrowest} wide, and {by} is too much for it"),
-                format!("a length below {} leaves some of it", narrowest / 2.0),
+                format!("nothing of the shape is left: {by} is too much for it"),
+                "less than half of the shape's thickness leaves some of it",
             )
         };
         self.report(Diagnostic::warning(Code::NOTHING_LEFT, at, message).help(help));
@@ -44,7 +42,7 @@ impl Lowering<'_> {
     pub fn warn_of_spindle(&mut self, parameters: &[Local], span: Span) {
         let known = |name: &str| {
             let local = parameters.iter().find(|local| local.name == name)?;
-            let super::value::Value::Number(node) = local.value else { return None };
+            let Value::Number(node) = local.value else { return None };
             self.known_value(node)
         };
         let (Some(ring), Some(section)) = (known("R"), known("r")) else { return };

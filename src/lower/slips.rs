@@ -289,6 +289,7 @@ impl Lowering<'_> {
             _ => return true,
         };
         let written = self.written(inner).unwrap_or("w").to_string();
+        let sign = if inner.span == expr.span { "" } else { "-" };
         let (message, help) = match dimension {
             Some(Dimension::LENGTH) => {
                 ("a length is not an angle".into(), "write an angle such as `45 deg` or `0.8 rad`".into())
@@ -296,11 +297,11 @@ impl Lowering<'_> {
             // a number with such a unit is no value of a shape, which is reported
             Some(Dimension::TURN_RATE) if matches!(inner.kind, ExprKind::Name(_)) => (
                 format!("`{written}` is a rate of turning, not an angle"),
-                format!("write `{written}*t` for a shape that turns as time passes"),
+                format!("write `{sign}{written}*t` for a shape that turns as time passes"),
             ),
             Some(Dimension::FREQUENCY) if matches!(inner.kind, ExprKind::Name(_)) => (
                 format!("`{written}` is a rate, not an angle"),
-                format!("write `2*pi*{written}*t` for a shape that turns so often in a second"),
+                format!("write `{sign}2*pi*{written}*t` for a shape that turns so often in a second"),
             ),
             Some(_) | None => return true,
         };

@@ -72,7 +72,7 @@ pub(in crate::cli) struct Pictures {
     bodies: Vec<Body>,
     /// How the surface of the fluid is drawn in place of the particles, and the plane that cuts it open.
     surface: Option<(Surface, Option<Cut>)>,
-    /// The speed at the end of the colours, m/s; `None` where they do not show speeds.
+    /// The speed at the end of the colours, m/s; `None` where they do not show speeds, and where the scene states it.
     colours_end: Option<f64>,
     pub(in crate::cli) count: usize,
 }
@@ -115,7 +115,7 @@ impl Pictures {
             every: experiment.scene().run.save_every,
             bodies,
             surface: look.surface.map(|surface| (surface, plane(look, experiment, &camera))),
-            colours_end: look.surface.is_none().then_some(fastest),
+            colours_end: (look.surface.is_none() && stated.is_none()).then_some(fastest),
             count: 0,
         })
     }

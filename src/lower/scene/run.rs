@@ -38,7 +38,7 @@ impl<'a> Lowering<'a> {
             (run.checkpoint_every, block.setting(keys::CHECKPOINT_EVERY.name))
             && every > run.until
         {
-            let [until, every] = [run.until, every].map(seconds_as_written);
+            let [until, every] = times_as_written([run.until, every]);
             let message = format!("a checkpoint every {every} in a run of {until}: only its end is saved");
             let help =
                 "a run that is interrupted saves one too; without this key there is one with every frame";
@@ -47,7 +47,7 @@ impl<'a> Lowering<'a> {
         if let (Some(dt), Some(at)) = (run.dt, run.dt_span)
             && dt > run.until
         {
-            let [until, step] = [run.until, dt].map(seconds_as_written);
+            let [until, step] = times_as_written([run.until, dt]);
             let message = format!("a step of {step} is longer than the run of {until}");
             let help = "leave `dt` out: the step is then as long as is stable";
             self.report(Diagnostic::error(Code::OUT_OF_RANGE, at, message).help(help));
@@ -64,7 +64,7 @@ impl<'a> Lowering<'a> {
     fn frames_fit(&mut self, run: &Run, at: Span) -> bool {
         const MANY: f64 = 20_000.0;
         let frames = run.until / run.save_every;
-        let [until, every] = [run.until, run.save_every].map(seconds_as_written);
+        let [until, every] = times_as_written([run.until, run.save_every]);
         let fewer = format!("write for example `save_every: {}`", seconds_as_written(run.until / 100.0));
         if frames > Scene::MOST_FRAMES as f64 {
             let message = format!(
@@ -86,9 +86,22 @@ impl<'a> Lowering<'a> {
     }
 }
 
+/// Two times as a file writes them, with as many digits as tell them apart, and two at least.
+pub(in crate::lower) fn times_as_written(times: [f64; 2]) -> [String; 2] {
+    let with = |digits: usize| times.map(|time| written_with(digits, time));
+    (2..ALL_DIGITS).map(with).find(|[a, b]| a != b).unwrap_or_else(|| with(ALL_DIGITS))
+}
+
+/// Digits that tell any two numbers apart.
+const ALL_DIGITS: usize = 17;
+
 /// A time as a file writes it, with two digits: `50 ms`, `0.2 s`.
 pub(in crate::lower) fn seconds_as_written(time: f64) -> String {
-    let rounded = |value: f64| format!("{value:.1e}").parse().unwrap_or(value);
+    written_with(2, time)
+}
+
+fn written_with(digits: usize, time: f64) -> String {
+    let rounded = |value: f64| format!("{value:.*e}", digits - 1).parse().unwrap_or(value);
     if time < 0.1 && time > 1e-5 {
         format!("{} ms", rounded(1e3 * time))
     } else {

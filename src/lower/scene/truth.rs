@@ -2,7 +2,7 @@
 
 use super::super::lowering::Lowering;
 use super::declaration::{SceneKey, declare_keys};
-use super::run::seconds_as_written;
+use super::run::times_as_written;
 use super::{Block, Truth};
 use crate::diagnostic::{Code, Diagnostic};
 
@@ -54,7 +54,7 @@ impl<'a> Lowering<'a> {
         if let (Some(until), Some((_, value))) = (until, block.setting(keys::FROM.name))
             && from > until
         {
-            let [from, until] = [from, until].map(seconds_as_written);
+            let [from, until] = times_as_written([from, until]);
             let message = format!("the solution holds from {from} on, and the run ends at {until}");
             self.report(
                 Diagnostic::warning(Code::NOTHING_COMPARED, value.span, message)
