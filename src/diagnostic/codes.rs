@@ -268,8 +268,8 @@ place fulfils both comparisons, so the ends are likely exchanged.
     solid slab = low <= z <= 1 and x^2 + y^2 <= 1";
 NOTHING_LEFT = "W0422":
 "`.round` takes a radius from the corners of a shape, a negative `.offset` moves its faces inwards, and `.shell` leaves a wall of
-its thickness. It is proven that nothing is left of the shape, or of the hollow within a shell, because it is less than twice as
-wide as that length somewhere.
+its thickness. It is proven that nothing is left of the shape, or of the hollow within a shell, because it is nowhere twice as
+thick as that length.
 
     rfm 1
     solid plate = box([0, 0, 0], [4, 3, 0.2]).round(0.5)     # 0.2 high: a radius below 0.1 leaves some of it";
@@ -318,8 +318,9 @@ ENERGY_GREW = "W0511":
 "The run's energy rose by more than 1 % above what it had at the start and gravity's work since then; where walls move, above
 what was left of that and their work, by more than 1 % of the greatest energy so far; or, where no wall moves, by more than 0.2 % of
 it and a quarter of the greatest energy of motion, as a low wave that grows does (of a fluid at rest, which hardly moves, that is not
-told). No fluid does that: the method made energy
-of its errors. What moves faster or higher than it could is wrong from then on. More particles, more `artificial_viscosity`
+told). With `gradients: differences` the work of walls is known to a tenth, so as much is allowed for, and 5 % besides.
+
+No fluid gains energy so: the method made it of its errors. What moves faster or higher than it could is wrong from then on. More particles, more `artificial_viscosity`
 (wcsph), or the other method may help; `energy_excess` in the summary has the largest value, and the probe `audit` shows when it
 arose. A run whose energy doubles stops, unless walls move.";
 VOLUME_CHANGED = "W0512":

@@ -105,8 +105,9 @@ impl Experiment {
         let mass = filling::mass_by_number(&scene, &fluid).unwrap_or(scene.fluid.mass);
         let mut parameters = parameters::of_scene(&program, &scene, mass, typical_speed);
         let mut method = scene.method;
-        let has_surface = || room::has_surface(&scene, &fluid, parts.iter().map(|part| &part.whole));
-        method.settle(&parameters.scales(), &has_surface);
+        let wholes = || parts.iter().map(|part| &part.whole);
+        let has_surface = || room::has_surface(&scene, &fluid, wholes(), parameters.spacing());
+        method.settle(&has_surface);
         let scene = Scene { method, ..scene };
         parameters.method = method;
         parameters.support_radius = parameters::support_radius(&scene, mass);

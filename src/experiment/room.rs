@@ -32,6 +32,16 @@ const MOST_SAMPLES: u32 = 1 << 18;
 /// taken.
 const CERTAIN: f64 = 5.0;
 
+/// Later instants, s, at which it is looked whether bodies that move leave room free, or take some: from the first to
+/// the last, each by the same factor later than the one before, so that no period hides. They do not depend on the
+/// run, which may be continued to a later end with the same method.
+const LATER: [f64; 2] = [0.01, 100.0];
+const INSTANTS: i32 = 24;
+
+/// A room for fewer particles is no full one: gaps of one particle are all there is, and differences of pressure
+/// fling particles through them.
+const FEWEST: f64 = 200.0;
+
 /// If the room of a scene is at least this many times the volume of its fluid, the fluid has a surface.
 pub(super) const LEAST_ROOM: f64 = 1.03;
 
@@ -62,7 +72,7 @@ impl<'a> Crowd<'a> {
         solids.all(|(solid, bounds)| bounds.is_some_and(|bounds| !bounds.contains(at)) || is_outside(solid))
     }
 
-    /// Whether a place lies in one of them, or on its surface.
+    /// Whether a place is proven to lie in one of them, or on its surface.
     pub fn takes(&self, at: DVec3) -> bool {
         let is_in = |solid: &Solid| solid.omega(at) >= 0.0;
         let mut solids = self.solids.iter();
@@ -382,7 +392,7 @@ pub(super) fn part_in_box(shape: &Solid, domain: &Aabb) -> Option<Aabb> {
     }
 }
 
-/// Most samples of which one is taken.
+/// Of so many samples one is looked at, at most.
 const SPARSEST: usize = 30;
 
 /// What obstacles take of a fluid's shape.
@@ -441,21 +451,46 @@ pub(super) fn samples(region: &Aabb) -> impl Iterator<Item = DVec3> + use<> {
     })
 }
 
-/// Whether the fluid leaves room free at the start, so that it has a free surface. Found by samples; if too few
-/// of them lie in the room, it counts as having one.
-pub(super) fn has_surface<'a>(scene: &Scene, fluid: &Solid, bodies: impl Iterator<Item = &'a Solid>) -> bool {
+/// Whether the fluid has a free surface: whether it leaves room free, or bodies that move change the room. Found by
+/// samples; if too few of them lie in the room, or too few particles of the given spacing, m, have a place there, it
+/// counts as having one.
+pub(super) fn has_surface<'a>(
+    scene: &Scene,
+    fluid: &Solid,
+    bodies: impl Iterator<Item = &'a Solid>,
+    spacing: f64,
+) -> bool {
     if scene.fluid.particles.is_some() && scene.fluid.size_span.is_some() {
         // that many particles of that size need not fill the shape
         return true;
     }
-    let bodies: Vec<Solid> = bodies.map(|body| body.at(0.0)).collect();
-    let bodies = Crowd::of(bodies.iter());
+    let (moving, still): (Vec<&Solid>, Vec<&Solid>) = bodies.partition(|body| body.moves());
+    let all_at = |time: f64| -> Vec<Solid> { moving.iter().map(|body| body.at(time)).collect() };
+    let now = all_at(0.0);
+    let later: Vec<Vec<Solid>> = if moving.is_empty() {
+        Vec::new()
+    } else {
+        let [first, last] = LATER;
+        let factor = (last / first).powf(1.0 / f64::from(INSTANTS - 1));
+        (0..INSTANTS).map(|k| all_at(first * factor.powi(k))).collect()
+    };
+    let (still, now) = (Crowd::of(still.into_iter()), Crowd::of(now.iter()));
+    let later: Vec<Crowd> = later.iter().map(|bodies| Crowd::of(bodies.iter())).collect();
     let (min, size) = (scene.domain.min, scene.domain.size());
-    let (mut dry, mut wet) = (0.0, 0.0);
-    let is_dry = |dry: f64, wet: f64| dry >= (LEAST_ROOM - 1.0) * wet;
+    let (mut dry, mut wet, mut looked) = (0.0, 0.0, 0.0);
+    // samples that bodies have left, less those that they have entered
+    let mut left = vec![0.0; later.len()];
     for k in 1..=MOST_SAMPLES {
         let at = min + size * (f64::from(k) * SPREAD).fract();
-        if !bodies.is_free(at) {
+        looked += 1.0;
+        if !still.is_free(at) {
+            continue;
+        }
+        let is_free = now.is_free(at);
+        for (left, then) in left.iter_mut().zip(&later) {
+            *left += f64::from(then.is_free(at)) - f64::from(is_free);
+        }
+        if !is_free {
             continue;
         }
         *(if fluid.omega(at) > 0.0 { &mut wet } else { &mut dry }) += 1.0;
@@ -464,10 +499,12 @@ pub(super) fn has_surface<'a>(scene: &Scene, fluid: &Solid, bodies: impl Iterato
             return true;
         }
         if dry + wet >= ENOUGH_SAMPLES {
-            return is_dry(dry, wet);
+            break;
         }
     }
-    dry + wet < LEAST_SAMPLES || is_dry(dry, wet)
+    let changed = left.into_iter().map(f64::abs).fold(0.0, f64::max);
+    let particles = scene.domain.volume() * wet / looked / spacing.powi(3);
+    dry + wet < LEAST_SAMPLES || particles < FEWEST || dry + changed >= (LEAST_ROOM - 1.0) * wet
 }
 
 /// A length as a file writes it, with three digits: `2.5 mm`, `0.12 m`.

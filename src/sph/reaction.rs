@@ -3,6 +3,7 @@
 use super::{
     contacts::Contacts,
     core::Core,
+    methods::Noted,
     walls::{NearMotion, Pushed, Share},
 };
 
@@ -16,6 +17,8 @@ const TURNS: u32 = 8;
 pub struct Reaction<'a> {
     core: &'a Core,
     contacts: &'a Contacts,
+    /// Whether forces are noted, and not only work.
+    are_forces: bool,
     /// Length of the step, s.
     dt: f64,
 }
@@ -24,8 +27,15 @@ impl<'a> Reaction<'a> {
     /// The notes of a step of the length `dt`, s; `None` if no probe asks for forces and no wall moves, if
     /// the method notes none, or for the start of a run.
     pub fn of(core: &'a Core, dt: f64) -> Option<Self> {
-        let is_noted = dt > 0.0 && core.parameters.method.numerics().notes_reactions();
-        core.contacts.as_ref().filter(|_| is_noted).map(|contacts| Self { core, contacts, dt })
+        let noted = core.parameters.method.numerics().noted();
+        let is_noted = dt > 0.0 && noted != Noted::Nothing;
+        let are_forces = |contacts: &Contacts| noted == Noted::Forces && contacts.are_for_forces();
+        core.contacts.as_ref().filter(|_| is_noted).map(|contacts| Self {
+            core,
+            contacts,
+            are_forces: are_forces(contacts),
+            dt,
+        })
     }
 
     /// Whether the work of several walls on a particle is divided in this step.
@@ -49,7 +59,7 @@ impl<'a> Reaction<'a> {
                 * (share.by_pressure.dot(boundary.wall_velocity(obstacle, at))
                     + share.by_friction.dot(boundary.velocity_along(obstacle, at)))
         };
-        if self.contacts.are_for_forces() {
+        if self.are_forces {
             return boundary.divide(wall, at, &pushed, |obstacle, share| {
                 self.contacts.add_work(i, work(obstacle, share));
                 self.contacts.add(i, obstacle, self.dt * (share.by_pressure + share.by_friction), at);

@@ -93,13 +93,16 @@ pub fn snapshot(topic: &str, name: &str, text: &str) {
     settings.bind(|| insta::assert_snapshot!(name.replace(' ', "_"), text));
 }
 
-/// The simulation of the first scene of a text, at its start.
-pub fn simulation(text: &str) -> rfm::sph::Simulation {
+/// The first scene of a text.
+pub fn experiment(text: &str) -> rfm::Experiment {
     let program = rfm::Program::from_source("scene.rfm", text).unwrap_or_else(|e| panic!("{e}"));
     let scene = &program.module().scenes[0];
-    let experiment =
-        rfm::Experiment::new(&program, &scene.name, rfm::Engine::Auto).unwrap_or_else(|e| panic!("{e}"));
-    experiment.start().unwrap_or_else(|e| panic!("{e}")).simulation
+    rfm::Experiment::new(&program, &scene.name, rfm::Engine::Auto).unwrap_or_else(|e| panic!("{e}"))
+}
+
+/// The simulation of the first scene of a text, at its start.
+pub fn simulation(text: &str) -> rfm::sph::Simulation {
+    experiment(text).start().unwrap_or_else(|e| panic!("{e}")).simulation
 }
 
 /// Runs a simulation until this time, s.

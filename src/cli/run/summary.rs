@@ -46,6 +46,9 @@ pub(super) struct Summary {
     /// Why it cannot be judged.
     #[serde(skip_serializing_if = "Option::is_none")]
     energy_unjudged: Option<&'static str>,
+    /// Whether `wall_work` is known to a tenth only.
+    #[serde(skip)]
+    work_is_rough: bool,
     /// The work of walls that move on the fluid, J; null if the energy cannot be judged.
     wall_work: Option<f64>,
     /// The largest change of the fluid's volume by the places of its particles, as a part of it.
@@ -117,6 +120,7 @@ impl Summary {
             energy_at_start: watch.energy_at_start,
             energy_excess: audit.energy_excess(),
             energy_unjudged: audit.unjudged(),
+            work_is_rough: audit.work_is_rough(),
             wall_work: audit.wall_work(),
             volume_change: audit.volume_change(),
             compression_mean: compression.mean,
@@ -169,8 +173,9 @@ pub(super) fn print(summary: &Summary, frames: &Frames, probes: &Probes) {
         readable(summary.kinetic_energy + summary.potential_energy),
         match (summary.energy_excess, summary.wall_work, summary.energy_unjudged) {
             (Some(excess), Some(work), _) if work != 0.0 => {
+                let known = if summary.work_is_rough { ", known to a tenth" } else { "" };
                 format!(
-                    "walls gave {} J; at most {excess:.2e} of the greatest energy came from nowhere",
+                    "walls gave {} J{known}; at most {excess:.2e} of the greatest energy came from nowhere",
                     readable(work)
                 )
             }

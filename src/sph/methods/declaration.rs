@@ -137,15 +137,15 @@ pub(in crate::sph) trait Declaration: Default + 'static {
     const KEYS: &'static [Key<Self>];
     /// Passes besides those that every method has, each with the reason if it does not run.
     const PASSES: &'static [(Pass, Absence<Self>)];
-    /// Columns of a checkpoint besides those that every method has.
+    /// Columns of a checkpoint of any scene, besides those that every method has.
     const SAVES: &'static [&'static str];
     /// Another support radius than that of the fluid's defaults, and when [`Declaration::support`] returns
     /// it, in words.
     const OTHER_SUPPORT: Option<(Support, &'static str)> = None;
 
-    /// Settles the numbers that are not stated and depend on whether the fluid of a scene has a free surface.
-    /// The search for one takes time, so a method asks only if it must.
-    fn settle(&mut self, _scales: &Scales, _has_surface: &dyn Fn() -> bool) {}
+    /// Takes up whether the fluid of a scene has a free surface. The search for one takes time, so a method asks
+    /// only if it must.
+    fn settle(&mut self, _has_surface: &dyn Fn() -> bool) {}
 
     /// The support radius that suits these numbers, for a fluid with surface tension or without.
     fn support(&self, _has_tension: bool) -> Support {

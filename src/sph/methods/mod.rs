@@ -45,7 +45,7 @@ pub use wcsph::{Gradients, Wcsph};
 
 use declaration::{Declaration, check, read, words};
 
-pub(super) use numerics::{COURANT, Numerics, StatedSound};
+pub(super) use numerics::{COURANT, Noted, Numerics, StatedSound};
 pub(super) use scheme::Scheme;
 pub(super) use start::start;
 
@@ -90,10 +90,10 @@ macro_rules! methods {
                 match self { $(Self::$method(numbers) => numbers.support(has_tension)),* }
             }
 
-            /// Settles the numbers that are not stated and depend on whether the fluid of a scene has a free
-            /// surface.
-            pub(crate) fn settle(&mut self, scales: &Scales, has_surface: &dyn Fn() -> bool) {
-                match self { $(Self::$method(numbers) => numbers.settle(scales, has_surface)),* }
+            /// Takes up whether the fluid of a scene has a free surface, on which some numbers depend that are
+            /// not stated.
+            pub(crate) fn settle(&mut self, has_surface: &dyn Fn() -> bool) {
+                match self { $(Self::$method(numbers) => numbers.settle(has_surface)),* }
             }
 
             /// Sets the numbers of the method from the keys that a scene states.
@@ -196,36 +196,32 @@ mod tests {
 
     #[test]
     fn only_what_is_not_stated_depends_on_the_surface_of_the_fluid() {
-        let oil = Scales {
-            rest_density: 1000.0,
-            particle_mass: 1e-3,
-            support_radius: 0.03,
-            viscosity: 10.0,
-            surface_tension: 0.0,
-            expected_speed: 1.0,
-            sticks: true,
-        };
-        let water = Scales { viscosity: 1e-3, ..oil };
-        let settled = |wcsph: Wcsph, scales: &Scales, has_surface: bool| {
+        let settled = |wcsph: Wcsph, has_surface: bool| {
             let mut method = Method::from(wcsph);
-            method.settle(scales, &|| has_surface);
+            method.settle(&|| has_surface);
             let Method::Wcsph(wcsph) = method else { panic!("{method:?}") };
-            wcsph.gradients
+            (wcsph.gradients(), wcsph.negative_pressure())
         };
-        let [pairs, differences] = [Some(Gradients::Pairs), Some(Gradients::Differences)];
+        let (pairs, differences) = (Gradients::Pairs, Gradients::Differences);
+        let (clamp, keep) = (NegativePressure::Clamp, NegativePressure::Keep);
         let open = Wcsph::default();
-        assert_eq!(settled(open, &oil, false), differences);
-        assert_eq!(settled(open, &oil, true), pairs);
-        assert_eq!(settled(open, &water, false), pairs);
-        assert_eq!(settled(Wcsph { shifting: Some(0.0), ..open }, &oil, false), pairs);
-        for gradients in [pairs, differences] {
-            for has_surface in [false, true] {
-                assert_eq!(settled(Wcsph { gradients, ..open }, &oil, has_surface), gradients);
-            }
+        assert_eq!(settled(open, false), (differences, keep));
+        assert_eq!(settled(open, true), (pairs, clamp));
+        // differences need the drift, which the scene rules out
+        assert_eq!(settled(Wcsph { shifting: Some(0.0), ..open }, false), (pairs, clamp));
+        assert_eq!(settled(Wcsph { gradients: Some(pairs), ..open }, false), (pairs, clamp));
+        assert_eq!(settled(Wcsph { gradients: Some(differences), ..open }, true), (differences, clamp));
+        for (stated, has_surface) in [(clamp, false), (keep, true)] {
+            let negative_pressure = Some(stated);
+            assert_eq!(settled(Wcsph { negative_pressure, ..open }, has_surface).1, stated);
+        }
+        for asks_nothing in [Wcsph { shifting: Some(0.0), ..open }, Wcsph { gradients: Some(pairs), ..open }]
+        {
+            Method::from(asks_nothing).settle(&|| panic!("the answer would not matter"));
         }
         for mut method in [Method::from(Dfsph::default()), Method::from(Paper::default())] {
             let before = method;
-            method.settle(&oil, &|| panic!("they do not ask"));
+            method.settle(&|| panic!("they do not ask"));
             assert_eq!(method, before);
         }
     }

@@ -25,6 +25,18 @@ pub(crate) struct StatedSound {
     pub driven_speed: f64,
 }
 
+/// What is noted of what walls do to particles.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(in crate::sph) enum Noted {
+    /// Nothing besides contacts.
+    Nothing,
+    /// The work of walls, to a tenth. Forces on obstacles are those of contacts, and of the pressure in front of
+    /// their surfaces.
+    Work,
+    /// The forces of walls, and so their work.
+    Forces,
+}
+
 /// The questions of the solver to a method's numbers.
 pub(in crate::sph) trait Numerics: Sync {
     /// The kinematic viscosity, m²/s, that damps the noise of particles, or would damp it by default: αhc/20
@@ -138,9 +150,8 @@ pub(in crate::sph) trait Numerics: Sync {
         false
     }
 
-    /// Whether each step notes the forces of walls on particles, see `Reaction`. Otherwise forces on
-    /// obstacles are those of contacts, and of the pressure in front of their surfaces.
-    fn notes_reactions(&self) -> bool {
-        false
+    /// What the notes of each step say about what walls do to particles, see `Reaction`.
+    fn noted(&self) -> Noted {
+        Noted::Nothing
     }
 }

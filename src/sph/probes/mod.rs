@@ -19,6 +19,7 @@ use super::{
     audit::Audit,
     core::Core,
     kernel::{Kernels, Wendland},
+    methods::Noted,
     stats::energies,
     walls::{Wall, WallKernel},
 };
@@ -165,7 +166,7 @@ impl Gauge {
                 let (time, total) =
                     (core.time, core.contacts.as_ref().map_or([0.0; 6], |c| c.total(obstacle)));
                 let passed = time - self.last[0];
-                let is_complete = core.parameters.method.numerics().notes_reactions();
+                let is_complete = core.parameters.method.numerics().noted() == Noted::Forces;
                 let mut force = if is_complete && passed > 0.0 {
                     [0.0; 6]
                 } else {

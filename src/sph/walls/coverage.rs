@@ -164,9 +164,14 @@ impl<F: Friction, B: Behind> Coverage<F, B> {
         Coverage { part, filled, gradient, spread, sweep, barrier, friction, behind: () }
     }
 
-    /// ⅓ tr K, the part of walls in what sums make of the gradient of a position.
+    /// ⅓ tr K, with the K of [`tensor`](Self::tensor).
     pub fn share(&self) -> f64 {
         self.part + self.spread.trace() / 3.0
+    }
+
+    /// K, the part of walls in what sums make of the gradient of a position.
+    pub fn tensor(&self) -> Symmetric {
+        self.part * Symmetric::IDENTITY + self.spread
     }
 
     /// (1 − K)⁻¹, by which a sum over the fluid alone becomes what it would be if the fluid continued behind

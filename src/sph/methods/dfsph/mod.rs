@@ -10,7 +10,7 @@ mod walls;
 pub(super) use start::spread;
 
 use super::declaration::{Absence, Declaration, FluidDefaults, Key, KeyBlock, Support, Value};
-use super::numerics::Numerics;
+use super::numerics::{Noted, Numerics};
 use super::roughness;
 use crate::precision::Precision;
 use crate::quantity::{Bound, Dimension};
@@ -215,7 +215,7 @@ impl Numerics for Dfsph {
         true
     }
 
-    fn notes_reactions(&self) -> bool {
-        true
+    fn noted(&self) -> Noted {
+        Noted::Forces
     }
 }

@@ -1,12 +1,13 @@
 //! The weakly compressible method: its numbers, keys and limits. The scheme is in [`scheme`].
 
+mod linear;
 mod numbers;
 mod passes;
 mod scheme;
 
 use super::declaration::{Absence, Declaration, FluidDefaults, Key, KeyBlock, Support, Value};
 use super::negative_pressure::NegativePressure;
-use super::numerics::{Numerics, StatedSound};
+use super::numerics::{Noted, Numerics, StatedSound};
 use super::roughness;
 use crate::precision::Precision;
 use crate::quantity::{Bound, Dimension};
@@ -45,7 +46,7 @@ pub enum Gradients {
 }
 
 /// Numbers of the weakly compressible method.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Wcsph {
     /// Speed of sound c, m/s. `None`: ten times √(u² + σ/ρa), with the greatest expected speed u, and the
     /// surface tension σ over a spacing a. This keeps changes of the density within 1 %.
@@ -57,41 +58,32 @@ pub struct Wcsph {
     /// With differences it acts on all motion, which would gain energy without it. `None`: 0.1 with pairs,
     /// 0.02 with differences, less what the fluid's own viscosity damps; zero: the term is not computed.
     pub artificial_viscosity: Option<f64>,
-    /// How the pressures of two particles enter their acceleration. `None`: in pairs. Where an
-    /// [`Experiment`](crate::experiment::Experiment) finds a viscous fluid that fills all room of its scene,
-    /// it chooses differences instead.
+    /// How the pressures of two particles enter their acceleration. `None`: by differences in a fluid that fills
+    /// its room, else in pairs.
     pub gradients: Option<Gradients>,
     /// Strength of the drift of particles to where there are fewer of them, which keeps them evenly
     /// distributed. Zero: no drift. `None`: 1 with differences of pressure, 0 with sums.
     pub shifting: Option<f64>,
-    /// The treatment of negative pressures. By default they are cut off at zero.
-    pub negative_pressure: NegativePressure,
+    /// The treatment of negative pressures. `None`: they are kept in a fluid that fills its room and has
+    /// gradients by differences, else cut off at zero. Without a surface, only differences of pressure matter.
+    pub negative_pressure: Option<NegativePressure>,
+    /// Whether the fluid fills all room of its scene, at all times, so that it has no surface. It is no key: an
+    /// [`Experiment`](crate::experiment::Experiment) finds it before there are particles, and overwrites what is
+    /// set here. [`Parameters::fills_vessel`](crate::sph::Parameters::fills_vessel) is about the particles of a
+    /// start.
+    pub fills_room: bool,
     /// Whether the fluid starts under the pressure of its own weight. If not, it starts without pressure, and
     /// oscillates.
     pub hydrostatic_start: bool,
-}
-
-impl Default for Wcsph {
-    fn default() -> Self {
-        Self {
-            sound_speed: None,
-            density_diffusion: None,
-            artificial_viscosity: None,
-            gradients: None,
-            shifting: None,
-            negative_pressure: NegativePressure::Clamp,
-            hydrostatic_start: false,
-        }
-    }
 }
 
 impl Wcsph {
     /// δ of the density diffusion, stated or derived. Surface tension acts on a layer of particles, so the
     /// density grows with the depth in that layer. Diffusion levels this growth out of step with the motion,
     /// and a drop gains energy, whether it oscillates or rests. So there is no diffusion unless waves of the
-    /// particles' size are much slower than the fluid.
+    /// particles' size are much slower than the fluid, or there is no surface that they could move.
     fn density_diffusion(&self, scales: &Scales) -> f64 {
-        let moves = ripples(scales) > CAPILLARY * scales.expected_speed;
+        let moves = !self.fills_room && ripples(scales) > CAPILLARY * scales.expected_speed;
         self.density_diffusion.unwrap_or(if moves { 0.0 } else { 0.1 })
     }
 
@@ -121,9 +113,18 @@ impl Wcsph {
     /// needs the curvature of a surface on a small scale.
     const NEAR: Support = Support::Spacings(2.6);
 
-    /// How pressures enter accelerations: as stated, else as suits the fluid of a scene, else in pairs.
+    /// How pressures enter accelerations: as stated, else as suits a fluid with or without a surface.
     pub fn gradients(&self) -> Gradients {
-        self.gradients.unwrap_or_default()
+        self.gradients.unwrap_or(if self.fills_room { Gradients::Differences } else { Gradients::Pairs })
+    }
+
+    /// The treatment of negative pressures, stated or derived.
+    pub fn negative_pressure(&self) -> NegativePressure {
+        self.negative_pressure.unwrap_or(if self.fills_room && self.gradients() == Gradients::Differences {
+            NegativePressure::Keep
+        } else {
+            NegativePressure::Clamp
+        })
     }
 
     /// The strength of the shifting, stated or derived.
@@ -200,7 +201,7 @@ impl Declaration for Wcsph {
                     Gradients::Pairs => "pairs",
                     Gradients::Differences => "differences",
                 },
-                derived: "differences in a viscous fluid that fills all its room at the start, else pairs",
+                derived: "differences in a fluid that fills all its room, else pairs",
             },
         },
         Key {
@@ -221,11 +222,11 @@ impl Declaration for Wcsph {
             about: "whether pressure may pull (keep) or is cut off at zero (clamp)",
             value: Value::Word {
                 words: &[
-                    ("clamp", |wcsph| wcsph.negative_pressure = NegativePressure::Clamp),
-                    ("keep", |wcsph| wcsph.negative_pressure = NegativePressure::Keep),
+                    ("clamp", |wcsph| wcsph.negative_pressure = Some(NegativePressure::Clamp)),
+                    ("keep", |wcsph| wcsph.negative_pressure = Some(NegativePressure::Keep)),
                 ],
-                get: |wcsph| wcsph.negative_pressure.name(),
-                derived: "",
+                get: |wcsph| wcsph.negative_pressure().name(),
+                derived: "keep in a fluid that fills all its room and has gradients by differences, else clamp",
             },
         },
         Key {
@@ -275,20 +276,16 @@ impl Declaration for Wcsph {
     const OTHER_SUPPORT: Option<(Support, &'static str)> =
         Some((Self::NEAR, "with surface tension or `gradients: differences`"));
 
-    /// Pairs are for splashes and waves, which a viscous fluid without a surface does not have. With pairs
-    /// its flow in a channel that closes on itself resists 13 % too much, with ten and with twenty particles
-    /// across. The shear stirs rows of particles that push each other apart, and viscosity takes that energy,
-    /// too. With differences, which need shifting, the resistance is right to 1 %. Water stays with pairs: if
-    /// it turns like a rigid body between walls along which it slips, differences take 8 % of its momentum in
-    /// three seconds at 5 rad/s.
-    fn settle(&mut self, scales: &Scales, has_surface: &dyn Fn() -> bool) {
-        if self.gradients.is_some() {
-            return;
-        }
-        let (sound, h) = (self.sound_speed(scales), scales.support_radius);
-        let noise = scales.rest_density * roughness::viscosity(DIFFERENCES_ALPHA, sound, h);
-        let suits = scales.viscosity >= noise && self.shifting != Some(0.0) && !has_surface();
-        self.gradients = Some(if suits { Gradients::Differences } else { Gradients::Pairs });
+    /// Pairs are for splashes and waves, which a fluid without a surface does not have. It has vortices and
+    /// layers that slide along each other, and there pairs of pressures push particles about: they resist in a
+    /// channel 13 % too much, take half of the energy of vortices in four seconds, and add a half to the mass
+    /// that a swinging ball moves.
+    fn settle(&mut self, has_surface: &dyn Fn() -> bool) {
+        let takes_differences = match self.gradients {
+            Some(stated) => stated == Gradients::Differences,
+            None => self.shifting != Some(0.0),
+        };
+        self.fills_room = takes_differences && !has_surface();
     }
 
     fn support(&self, has_tension: bool) -> Support {
@@ -352,15 +349,18 @@ impl Numerics for Wcsph {
     /// by pressure. It differs from ∫ p/ρ² dρ by twice the compression.
     fn elastic_energy(&self, scales: &Scales, density: f64) -> f64 {
         let x = density / scales.rest_density;
-        if x < 1.0 && self.negative_pressure == NegativePressure::Clamp {
+        if x < 1.0 && self.negative_pressure() == NegativePressure::Clamp {
             return 0.0;
         }
         self.sound_speed(scales).powi(2) / 7.0 * ((x.powi(8) - 1.0) / 8.0 - (x - 1.0))
     }
 
     /// Differences of pressure do not cancel, so the neighbours of a particle contribute to what remains.
-    fn notes_reactions(&self) -> bool {
-        self.gradients() == Gradients::Pairs
+    fn noted(&self) -> Noted {
+        match self.gradients() {
+            Gradients::Pairs => Noted::Forces,
+            Gradients::Differences => Noted::Work,
+        }
     }
 }
 

@@ -16,6 +16,9 @@ pub(super) struct Numbers {
     pub gradients: Gradients,
     pub shifting: f64,
     pub negative_pressure: NegativePressure,
+    /// Whether the fluid has no surface and gradients by differences, so that only differences of its densities
+    /// matter.
+    pub fills_room: bool,
 }
 
 impl Numbers {
@@ -26,7 +29,8 @@ impl Numbers {
             artificial_viscosity: wcsph.artificial_viscosity(&parameters.scales()),
             gradients: wcsph.gradients(),
             shifting: wcsph.shifting(),
-            negative_pressure: wcsph.negative_pressure,
+            negative_pressure: wcsph.negative_pressure(),
+            fills_room: wcsph.fills_room && wcsph.gradients() == Gradients::Differences,
         }
     }
 }

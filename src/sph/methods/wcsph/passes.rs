@@ -11,6 +11,7 @@ use super::super::{
     shifting::{depth, falling_rate, return_rate},
 };
 use super::Gradients;
+use super::linear::Linear;
 use super::numbers::{Numbers, at_rest};
 use crate::sph::{
     core::Core,
@@ -19,7 +20,7 @@ use crate::sph::{
     params::Parameters,
     particles::Vectors,
     reaction::Reaction,
-    walls::{Friction, Pushed, Symmetric, WallDrag, inverse_above},
+    walls::{Friction, Pushed, Symmetric, WallDrag},
 };
 
 /// Squares of distances below this part of h² do not count as a direction.
@@ -35,18 +36,17 @@ const HELD: [f64; 2] = [0.7, 0.8];
 /// With 0.03 water that has splashed stands 2 % too high.
 const LOOSE: f64 = 0.02;
 
-/// Smallest part of Σ V r⊗∇W along a direction by which a gradient is divided. In a corner particles have
-/// about a fifth.
-const LEAST_MOMENT: f64 = 0.1;
-
 /// Number of sums of [`Pairs`].
 const SUMS: usize = 16;
 
 /// Number of sums of [`Shifted`], which those of Σ f·d⊗d follow.
 const SHIFTED_SUMS: usize = SUMS + 3;
 
-/// Number of sums of [`Differences`].
-const DIFFERENCES_SUMS: usize = SHIFTED_SUMS + 5;
+/// Number of sums of [`Differences`]: those, and two symmetric tensors whose traces they contain.
+const DIFFERENCES_SUMS: usize = SHIFTED_SUMS + 10;
+
+/// Components of a symmetric tensor besides zz, which follows from the trace.
+const COMPONENTS: [(usize, usize); 5] = [(0, 0), (1, 1), (1, 2), (2, 0), (0, 1)];
 
 /// How far a particle at a wall takes part in the balance of the fluid, 0 to 1, from its Σ V W.
 fn held(filled: f64) -> f64 {
@@ -86,6 +86,8 @@ pub(super) struct Rates<'a> {
     missing: &'a [f64],
     /// Σ V W on a lattice.
     lattice: f64,
+    /// The mean density by places to which densities return, over the rest density.
+    pub mean_filled: f64,
     /// Receives the forces of walls, if they are wanted.
     reaction: Option<Reaction<'a>>,
 }
@@ -127,6 +129,7 @@ impl<'a> Rates<'a> {
             closing_rate: return_rate(core).max(falling_rate(core)),
             missing,
             lattice: Wendland::lattice_sum(parameters.support_radius / parameters.spacing()),
+            mean_filled: 1.0,
             reaction: Reaction::of(core, dt),
         }
     }
@@ -200,15 +203,15 @@ impl<const LAMINAR: bool, const ARTIFICIAL: bool, const EVEN: bool> Pairs<'_, LA
         }
     }
 
-    /// The results of a particle from its sums. `denser_along` is Σ f·(ρ_j − ρ₀)·d, and `moment` is Σ f·d⊗d
-    /// if pressures act by their differences.
+    /// The results of a particle from its sums. `denser_along` is Σ f·(ρ_j − ρ₀)·d, and `linear` has the tensors
+    /// of differences of pressure.
     fn finished(
         &self,
         i: usize,
         sums: [f64; SUMS],
         denser_along: DVec3,
-        moment: Option<Symmetric>,
-    ) -> [f64; 13] {
+        linear: Option<Linear>,
+    ) -> [f64; 14] {
         let [px, py, pz, departing, denser, cx, cy, cz, squares, weights, ux, uy, uz, sx, sy, sz] = sums;
         let rates = &self.0;
         let Rates { parameters, steepness, laminar, .. } = *rates;
@@ -221,7 +224,7 @@ impl<const LAMINAR: bool, const ARTIFICIAL: bool, const EVEN: bool> Pairs<'_, LA
         }
         let mut push = steepness * DVec3::new(px, py, pz);
         let mut spread = steepness * squares / 3.0;
-        let mut compression = -steepness * departing;
+        let compression_by_pairs = -steepness * departing;
         let mut drag = 10.0 * laminar * steepness * DVec3::new(ux, uy, uz);
         let mut by_friction = DVec3::ZERO;
         let velocity = rates.velocity.get(i);
@@ -269,9 +272,14 @@ impl<const LAMINAR: bool, const ARTIFICIAL: bool, const EVEN: bool> Pairs<'_, LA
             push = push.lerp(wall.completion() * push, balanced);
         }
         push *= mean;
-        if let Some(moment) = moment.filter(|_| smooth > 0.0) {
-            let gradient = inverse_above(&(steepness * moment).to_matrix(), LEAST_MOMENT);
-            push = push.lerp(gradient * blended, smooth);
+        let mut compression = mean * (compression_by_pairs + wall_rate);
+        if let Some(linear) = linear.filter(|_| smooth > 0.0) {
+            push = push.lerp(linear.gradient(steepness, blended), smooth);
+            // before a surface too few neighbours lie on one side, and what is exact is noisy
+            if rates.numbers.fills_room {
+                let exact = linear.compression(steepness, wall.as_ref(), wall_rate);
+                compression += smooth * (exact - compression);
+            }
         }
         if let Some(wall) = &wall {
             let pressure = rates.pressure[i];
@@ -293,12 +301,11 @@ impl<const LAMINAR: bool, const ARTIFICIAL: bool, const EVEN: bool> Pairs<'_, LA
         let mut drift = denser + returning * rates.returns(i, whole);
         let rate = if rates.differences {
             // densities follow the equation of continuity
-            compression += wall_rate;
-            drift += mean * density * compression;
+            drift += density * compression;
             places = 0.0;
             0.0
         } else {
-            rest * (compression + 2.0 * wall_rate)
+            rest * (compression_by_pairs + 2.0 * wall_rate)
         };
         [
             acceleration.x,
@@ -314,11 +321,12 @@ impl<const LAMINAR: bool, const ARTIFICIAL: bool, const EVEN: bool> Pairs<'_, LA
             smooth.x,
             smooth.y,
             smooth.z,
+            depth,
         ]
     }
 }
 
-impl<const LAMINAR: bool, const ARTIFICIAL: bool, const EVEN: bool> PairPass<8, SUMS, 13>
+impl<const LAMINAR: bool, const ARTIFICIAL: bool, const EVEN: bool> PairPass<8, SUMS, 14>
     for Pairs<'_, LAMINAR, ARTIFICIAL, EVEN>
 {
     #[inline(always)]
@@ -333,7 +341,7 @@ impl<const LAMINAR: bool, const ARTIFICIAL: bool, const EVEN: bool> PairPass<8, 
         self.sum(d, r2, own, &other, sums);
     }
 
-    fn finish(&self, i: usize, sums: [f64; SUMS]) -> [f64; 13] {
+    fn finish(&self, i: usize, sums: [f64; SUMS]) -> [f64; 14] {
         self.finished(i, sums, DVec3::ZERO, None)
     }
 }
@@ -362,7 +370,7 @@ impl<const LAMINAR: bool, const ARTIFICIAL: bool> Shifted<'_, LAMINAR, ARTIFICIA
     }
 }
 
-impl<const LAMINAR: bool, const ARTIFICIAL: bool> PairPass<8, SHIFTED_SUMS, 13>
+impl<const LAMINAR: bool, const ARTIFICIAL: bool> PairPass<8, SHIFTED_SUMS, 14>
     for Shifted<'_, LAMINAR, ARTIFICIAL>
 {
     #[inline(always)]
@@ -380,7 +388,7 @@ impl<const LAMINAR: bool, const ARTIFICIAL: bool> PairPass<8, SHIFTED_SUMS, 13>
         sums[SUMS..].copy_from_slice(&denser);
     }
 
-    fn finish(&self, i: usize, sums: [f64; SHIFTED_SUMS]) -> [f64; 13] {
+    fn finish(&self, i: usize, sums: [f64; SHIFTED_SUMS]) -> [f64; 14] {
         let (all, denser) = split(&sums);
         Pairs::<LAMINAR, ARTIFICIAL, true>(self.0).finished(i, all, DVec3::from_array(denser), None)
     }
@@ -392,13 +400,12 @@ fn split<V: Copy>(sums: &[V]) -> ([V; SUMS], [V; 3]) {
     (std::array::from_fn(|k| sums[k]), std::array::from_fn(|k| sums[SUMS + k]))
 }
 
-/// The pass over pairs where pressures act by their differences. It also sums f·d⊗d but for its last
-/// component, which follows from f·d². This tensor makes the gradient of a pressure that is linear in space
-/// exact wherever the particles lie.
+/// The pass over pairs where pressures act by their differences. It also sums f·d⊗d and f·(v_i − v_j)⊗d, for
+/// [`Linear`].
 #[derive(Clone, Copy)]
 pub(super) struct Differences<'a, const LAMINAR: bool, const ARTIFICIAL: bool>(pub Rates<'a>);
 
-impl<const LAMINAR: bool, const ARTIFICIAL: bool> PairPass<8, DIFFERENCES_SUMS, 13>
+impl<const LAMINAR: bool, const ARTIFICIAL: bool> PairPass<8, DIFFERENCES_SUMS, 14>
     for Differences<'_, LAMINAR, ARTIFICIAL>
 {
     #[inline(always)]
@@ -416,18 +423,29 @@ impl<const LAMINAR: bool, const ARTIFICIAL: bool> PairPass<8, DIFFERENCES_SUMS, 
         sums[SUMS..SHIFTED_SUMS].copy_from_slice(&denser);
         let s = self.0.kernel.nearness(r2);
         let f = s * s * s;
-        for (k, (a, b)) in [(0, 0), (1, 1), (1, 2), (2, 0), (0, 1)].into_iter().enumerate() {
-            sums[SHIFTED_SUMS + k] = (f * d[a]).mul_add(d[b], sums[SHIFTED_SUMS + k]);
+        let along: [V; 3] = std::array::from_fn(|k| f * d[k]);
+        let parting: [V; 3] = std::array::from_fn(|k| own[k] - other[k]);
+        for (k, (a, b)) in COMPONENTS.into_iter().enumerate() {
+            let (moment, part) = (SHIFTED_SUMS + k, SHIFTED_SUMS + COMPONENTS.len() + k);
+            sums[moment] = along[a].mul_add(d[b], sums[moment]);
+            sums[part] = along[a].mul_add(parting[b], sums[part]);
+            if a != b {
+                sums[part] = along[b].mul_add(parting[a], sums[part]);
+            }
         }
     }
 
-    fn finish(&self, i: usize, sums: [f64; DIFFERENCES_SUMS]) -> [f64; 13] {
-        let [xx, yy, yz, zx, xy] = std::array::from_fn(|k| sums[SHIFTED_SUMS + k]);
+    fn finish(&self, i: usize, sums: [f64; DIFFERENCES_SUMS]) -> [f64; 14] {
         let (all, denser) = split(&sums);
-        let squares = all[8];
-        let moment = Symmetric::new(DVec3::new(xx, yy, squares - xx - yy), DVec3::new(yz, zx, xy));
-        let denser = DVec3::from_array(denser);
-        Pairs::<LAMINAR, ARTIFICIAL, true>(self.0).finished(i, all, denser, Some(moment))
+        let tensor = |from: usize, trace: f64, beside: f64| {
+            let [xx, yy, yz, zx, xy] = std::array::from_fn(|k| sums[from + k]);
+            Symmetric::new(DVec3::new(xx, yy, trace - xx - yy), beside * DVec3::new(yz, zx, xy))
+        };
+        let moment = tensor(SHIFTED_SUMS, all[8], 1.0);
+        // beside the diagonal both a⊗b and b⊗a were summed
+        let parting = tensor(SHIFTED_SUMS + COMPONENTS.len(), all[3], 0.5);
+        let (denser, linear) = (DVec3::from_array(denser), Linear { moment, parting });
+        Pairs::<LAMINAR, ARTIFICIAL, true>(self.0).finished(i, all, denser, Some(linear))
     }
 }
 
@@ -450,7 +468,7 @@ impl Rates<'_> {
     /// stand 15 % too high, and a block that is lowered into it would raise it four times too far.)
     fn returns(&self, i: usize, filled: f64) -> f64 {
         let rest = self.parameters.rest_density;
-        let (target, density) = (rest * filled, self.density[i]);
+        let (target, density) = (rest * filled / self.mean_filled, self.density[i]);
         if !closes_gaps(self.numbers) || target >= density {
             return self.return_rate * (target - density);
         }

@@ -41,6 +41,11 @@
 //! on a lattice at h = 2.6 spacings), and there pressures act as sums p_i + p_j with this key, too. Densities
 //! then follow the equation of continuity, and neither energy nor momentum is conserved by construction.
 //!
+//! A fluid that fills its room has these gradients by default. It has no surface at which they are less exact
+//! than pairs, so more is asked of it: the divergence is exact for a velocity that is linear in space, too
+//! ([`Linear`](super::linear::Linear)), negative pressures are kept, because only differences of pressure have a
+//! meaning, and shifting moves only what is uneven between neighbours ([`Common`]).
+//!
 //! Walls enter by λ, ∇λ and K in closed form ([`Coverage`](crate::sph::walls::Coverage)). They mirror the
 //! pressure and the velocity of a particle. In the depth of the fluid the pressure beyond a wall is also
 //! continued linearly by the fluid's own balance ∇p = ρ(g + viscous − a). Since a is the unknown, this is a
@@ -59,12 +64,13 @@
 
 use glam::DVec3;
 use rayon::prelude::*;
+use smallvec::SmallVec;
 
 use super::super::{
     dfsph::spread,
     roughness::Roughness,
     scheme::{Scheme, Start},
-    shifting::{restore_crowding, save_crowding, shift},
+    shifting::{Common, restore_crowding, save_crowding, shift},
     tension::Tension,
 };
 use super::numbers::{Numbers, at_rest, sums_crowding, tait};
@@ -91,9 +97,15 @@ pub struct Weakly {
     drift: Vec<f64>,
     /// Densities that follow from the places of the particles alone, kg/m³.
     filled: Vec<f64>,
-    /// Σ V ∇W + ∇λ, 1/m, without the part due to compression: the direction in which particles crowd. It is
-    /// zero at the surface.
+    /// Σ V ∇W + ∇λ, 1/m, without the part due to compression and, in a fluid that fills its room, without what
+    /// neighbours have in common: the direction in which particles crowd. It is zero at the surface.
     crowding: Vectors,
+    /// What neighbours have in common, if the fluid fills its room.
+    common: Option<Common>,
+    /// How far each particle belongs to the depth of the fluid, 0 to 1.
+    depth: Vec<f64>,
+    /// The mean of [`filled`](Self::filled) over the rest density in a fluid that fills its room, else one.
+    mean_filled: f64,
     /// Predicted ρ − ρ₀.
     excess: Vec<f64>,
     /// The density that kernels miss before a free surface, as a part of the rest density. It is found every
@@ -113,8 +125,9 @@ const COLUMNS: [&str; 5] =
 /// changes within some hundred steps.
 const SURFACE_STEPS: u64 = 8;
 
-/// Name of the length of the last step in a checkpoint.
+/// Names of the length of the last step and of the mean density by places in a checkpoint.
 const LAST_STEP: &str = "last step";
+const MEAN_FILLED: &str = "mean density of places";
 
 impl Scheme for Weakly {
     fn step(&mut self, core: &mut Core, longest: f64) -> Result<f64, StepError> {
@@ -122,17 +135,7 @@ impl Scheme for Weakly {
         add_scaled(&mut core.particles.velocity, &core.acceleration, 0.5 * dt);
         core.move_obstacles(dt);
         core.drift(dt, shift(self.numbers.shifting, &self.crowding, core))?;
-        let [sx, sy, sz] = self.roughness.columns();
-        core.sort(&mut [
-            &mut self.places,
-            &mut self.rate,
-            &mut self.earlier_rate,
-            &mut self.drift,
-            &mut self.missing,
-            sx,
-            sy,
-            sz,
-        ]);
+        self.sort(core);
         self.find_rates(core, dt);
         add_scaled(&mut core.particles.velocity, &core.acceleration, 0.5 * dt);
         self.find_pressure(core, dt);
@@ -147,6 +150,10 @@ impl Scheme for Weakly {
         }
         checkpoint.set(LAST_STEP, vec![self.last_dt]);
         save_crowding(&self.crowding, checkpoint);
+        if let Some(common) = &self.common {
+            common.save(checkpoint);
+            checkpoint.set(MEAN_FILLED, vec![self.mean_filled]);
+        }
         self.roughness.save(checkpoint);
     }
 
@@ -160,6 +167,12 @@ impl Scheme for Weakly {
             self.last_dt = *last_dt;
         }
         self.crowding = restore_crowding(checkpoint)?;
+        if let Some(common) = &mut self.common {
+            common.restore(checkpoint)?;
+            if let [mean] = checkpoint.get(MEAN_FILLED)? {
+                self.mean_filled = *mean;
+            }
+        }
         self.roughness.restore(checkpoint)
     }
 
@@ -168,10 +181,12 @@ impl Scheme for Weakly {
     }
 
     fn bytes(&self) -> usize {
-        let Self { places, rate, earlier_rate, drift, filled, found: [a, b], excess, missing, .. } = self;
-        let columns = [places, rate, earlier_rate, drift, filled, a, b, excess, missing];
+        let Self { places, rate, earlier_rate, drift, filled, depth, found: [a, b], excess, missing, .. } =
+            self;
+        let columns = [places, rate, earlier_rate, drift, filled, depth, a, b, excess, missing];
         columns.map(|column| 8 * column.capacity()).iter().sum::<usize>()
             + self.crowding.bytes()
+            + self.common.as_ref().map_or(0, Common::bytes)
             + self.tension.bytes()
             + self.roughness.bytes()
     }
@@ -206,6 +221,9 @@ impl Weakly {
             drift: vec![0.0; n],
             filled: vec![0.0; n],
             crowding: Vectors::default(),
+            common: numbers.fills_room.then(|| Common::of(n)),
+            depth: vec![0.0; n],
+            mean_filled: 1.0,
             excess: Vec::new(),
             missing: vec![0.0; n],
             roughness: Roughness::of(&core.particles.velocity, numbers.gradients == Gradients::Pairs),
@@ -216,6 +234,16 @@ impl Weakly {
         scheme.find_rates(core, 0.0);
         scheme.find_pressure(core, 0.0);
         scheme
+    }
+
+    /// Sorts particles, and what is kept of them between steps, by their cells.
+    fn sort(&mut self, core: &mut Core) {
+        let own =
+            [&mut self.places, &mut self.rate, &mut self.earlier_rate, &mut self.drift, &mut self.missing];
+        let mut columns: SmallVec<[&mut Vec<f64>; 11]> = SmallVec::from_iter(own);
+        columns.extend(self.roughness.columns());
+        columns.extend(self.common.iter_mut().flat_map(Common::columns));
+        core.sort(&mut columns);
     }
 
     /// Finds the pressures of the densities, and the greatest speed of sound after a step of the length `dt`.
@@ -248,6 +276,7 @@ impl Weakly {
         self.predict_densities(core, dt);
         self.crowding.resize(n);
         self.filled.resize(n, 0.0);
+        self.depth.resize(n, 0.0);
         let mut pressure = std::mem::take(&mut core.particles.pressure);
         self.find_excess(core, &mut pressure);
         let numbers = &self.numbers;
@@ -274,12 +303,14 @@ impl Weakly {
             sx,
             sy,
             sz,
+            &mut self.depth,
         ];
         self.missing.resize(n, 0.0);
         if closes_gaps(numbers) && core.steps.is_multiple_of(SURFACE_STEPS) {
             core.sum(&Missing::new(core), [], [&mut self.missing]);
         }
-        let rates = Rates::new(core, numbers, &predicted, &pressure, &self.excess, &self.missing, dt);
+        let mut rates = Rates::new(core, numbers, &predicted, &pressure, &self.excess, &self.missing, dt);
+        rates.mean_filled = self.mean_filled;
         if numbers.gradients == Gradients::Differences {
             match (rates.laminar > 0.0, rates.artificial > 0.0) {
                 (true, true) => core.sum(&Differences::<true, true>(rates), fields, out),
@@ -303,6 +334,10 @@ impl Weakly {
                 (false, false, false, true) => core.sum(&Pairs::<false, true, false>(rates), fields, out),
                 (false, false, false, false) => core.sum(&Pairs::<false, false, false>(rates), fields, out),
             }
+        }
+        if let Some(common) = self.common.as_mut().filter(|_| n > 0) {
+            common.subtract_from(&mut self.crowding, &self.depth, core);
+            self.mean_filled = self.filled.iter().sum::<f64>() / (n as f64 * core.parameters.rest_density);
         }
         core.acceleration = acceleration;
         core.particles.pressure = pressure;

@@ -1,0 +1,46 @@
+//! Gradients and divergences of what is linear in space, from sums over neighbours that may lie anywhere.
+
+use glam::DVec3;
+
+use crate::sph::walls::{Coverage, Symmetric, inverse_above};
+
+/// Smallest part of Σ V r⊗∇W along a direction by which a gradient is divided. In a corner particles have
+/// about a fifth.
+const LEAST_MOMENT: f64 = 0.1;
+
+/// Sums by which the gradient of a pressure and the divergence of a velocity that are linear in space are exact,
+/// wherever the particles lie.
+#[derive(Clone, Copy)]
+pub(super) struct Linear {
+    /// Σ f·d⊗d.
+    pub moment: Symmetric,
+    /// The symmetric part of Σ f·(v_i − v_j)⊗d. The moment is symmetric, so the other part would change nothing.
+    pub parting: Symmetric,
+}
+
+impl Linear {
+    /// The gradient whose sum over the neighbours alone is `sum`. Half of the neighbours suffice, so nothing is
+    /// assumed behind a wall.
+    pub fn gradient(&self, steepness: f64, sum: DVec3) -> DVec3 {
+        inverse_above(&(steepness * self.moment).to_matrix(), LEAST_MOMENT) * sum
+    }
+
+    /// The rate −∇·v at which the fluid is compressed, 1/s. A wall fills a part of the kernel as neighbours do,
+    /// and its approach is a velocity along its normal. (In a corner it is taken along the mean normal.)
+    ///
+    /// (Without the tensors a flow that stretches the lattice of its particles has a false divergence: vortices
+    /// that fill a box gain 8 % of energy when the lattice breaks, and 1 % with them. With the tensors for the
+    /// pairs alone, and not for the wall's approach, water at rest moves along its walls at up to 5 cm/s.)
+    pub fn compression(&self, steepness: f64, wall: Option<&Coverage>, wall_rate: f64) -> f64 {
+        let by_pairs = steepness * self.moment;
+        let whole = wall.map_or(by_pairs, |wall| by_pairs + wall.tensor());
+        let inverse = inverse_above(&whole.to_matrix(), LEAST_MOMENT);
+        let parting = self.parting.to_matrix();
+        let product = (0..3).map(|k| inverse.col(k).dot(parting.col(k))).sum::<f64>();
+        let across = wall.map_or(0.0, |wall| {
+            let normal = wall.gradient.normalize_or_zero();
+            normal.dot(inverse * normal)
+        });
+        wall_rate * across - steepness * product
+    }
+}
