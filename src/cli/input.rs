@@ -37,9 +37,7 @@ pub(super) fn files(shared: &Shared, source: &Source) -> Files {
 /// Checks a source with the params of the command line.
 pub(super) fn check(shared: &Shared, source: Source, files: Files) -> Result<Program, Diagnostics> {
     let overrides = shared.define.iter().map(|given| (given.name.clone(), given.value)).collect();
-    let dimensions =
-        shared.define.iter().filter_map(|given| Some((given.name.clone(), given.dimension?))).collect();
-    let places = shared.places();
+    let (dimensions, places) = (shared.dimensions(), shared.places());
     let max_nodes = shared.max_nodes;
     let options = Options { overrides, dimensions, places, max_nodes, files, ..Options::default() };
     Program::check(source, options)

@@ -5,6 +5,7 @@ use std::num::NonZeroUsize;
 use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
+use rfm::quantity::Dimension;
 
 use super::values::{Definition, definition, threads};
 
@@ -34,6 +35,13 @@ pub(super) struct Shared {
 }
 
 impl Shared {
+    /// The kinds of quantities of the params that are given with a unit. A later one without a unit hides an earlier one.
+    pub fn dimensions(&self) -> BTreeMap<String, Dimension> {
+        let last: BTreeMap<&str, Option<Dimension>> =
+            self.define.iter().map(|given| (given.name.as_str(), given.dimension)).collect();
+        last.into_iter().filter_map(|(name, dimension)| Some((name.to_string(), dimension?))).collect()
+    }
+
     /// Where those params stand that files set, by their names. Of two values for one param the later one counts.
     pub fn places(&self) -> BTreeMap<String, String> {
         let mut places = BTreeMap::new();

@@ -415,6 +415,15 @@ fn equal_operands_are_told_of_where_a_person_has_written_them() {
     }
 }
 
+/// What is left of a cone is a point up to rounding, which no grid divides. The other solids of the file are measured.
+#[test]
+fn a_solid_that_is_next_to_nothing_does_not_hide_the_others() {
+    let text = b"rfm 1\nsolid s = cone(0.5, 1).offset(-0.5)\nsolid d = sphere(1)\n";
+    let said = rfm_reading(root(), &["check", "-"], text).expect(0).stdout;
+    assert!(said.contains("volume      not found: the room around [0, 0, 0.5] cannot be divided"), "{said}");
+    assert!(said.contains("volume      4.18879"), "{said}");
+}
+
 #[test]
 fn a_volume_that_is_no_number_is_not_called_thin() {
     let text = b"rfm 1\nsolid s = box([0, 0, 0], [1, 1, 1]) and log10(x) <= 0\n";

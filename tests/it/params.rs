@@ -25,6 +25,7 @@ fn params_come_from_files_and_flags_go_before_them() {
         ("\nq = 1", "bad.toml:2: `q` is set, but the file declares no such param"),
         ("\ndensity = 1", "and set `p` here"),
         ("# 3\nr = 3", "bad.toml:2: `r` is set to 3, outside its range 0.01 .. 2"),
+        ("h = 1 # it was, r = 3\nr = 3", "bad.toml:2: `r` is set to 3"),
         ("d = 8", "bad.toml:1: `d` = 8 means 8 m, and the file writes it in mm"),
         ("d = 8", "write d = \"8000 mm\", or d = \"8 mm\" if that is meant"),
         ("h = \"8 kg\"", "bad.toml:1: the unit that `h` is given in does not fit"),
@@ -43,4 +44,7 @@ fn params_come_from_files_and_flags_go_before_them() {
     write("bad.toml", "r = 3");
     let outcome = rfm(folder.path(), &["check", "a.rfm", "-P", "bad.toml", "-D", "r=4"]).expect(2);
     assert!(outcome.stderr.contains("error[E0211]: `r` is set to 4"), "{}", outcome.stderr);
+    write("bad.toml", "d = \"8 mm\"");
+    let outcome = rfm(folder.path(), &["check", "a.rfm", "-P", "bad.toml", "-D", "d=8"]).expect(0);
+    assert!(outcome.stderr.contains("`d` = 8 means 8 m"), "{}", outcome.stderr);
 }

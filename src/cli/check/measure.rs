@@ -40,10 +40,15 @@ pub(super) fn measure(solid: &Solid, file: &str, deadline: &Deadline) -> Result<
     };
     facts.bounds = Some(Box3::of(bounds));
     let surface = solid.surface(bounds.grown(0.1 * bounds.size().max_element()));
-    let grid = Grid::around(bounds, RESOLUTION).map_err(|error| {
-        let place = to_thousandths(bounds.centre());
-        Failure::usage(format!("cannot divide the room around `{}`, at {place}: {error}", solid.name()))
-    })?;
+    let grid = match Grid::around(bounds, RESOLUTION) {
+        Ok(grid) => grid,
+        Err(error) => {
+            // one solid that is next to nothing, or far away, says nothing about the others of a file
+            let place = to_thousandths(bounds.centre());
+            facts.no_volume = Some(format!("the room around {place} cannot be divided: {error}"));
+            return Ok((facts, ThinCells::NONE));
+        }
+    };
     match mesh::volume(&*surface, bounds, VOLUME_CELLS, deadline) {
         Ok(found) => {
             facts.volume = Some(found.volume);

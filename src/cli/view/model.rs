@@ -82,11 +82,7 @@ impl Subject {
             cells: options.mesh_cells,
             places: shared.places(),
             define: shared.define.iter().map(|given| (given.name.clone(), given.value)).collect(),
-            dimensions: shared
-                .define
-                .iter()
-                .filter_map(|given| Some((given.name.clone(), given.dimension?)))
-                .collect(),
+            dimensions: shared.dimensions(),
             max_nodes: shared.max_nodes,
             files: files_beside(&options.subject, shared.allow_outside),
             engine: shared.engine.into(),

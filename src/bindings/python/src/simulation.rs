@@ -9,6 +9,7 @@ use pyo3::exceptions::{PyBufferError, PyRuntimeError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::sync::PyOnceLock;
 use pyo3::types::{PyDict, PyTuple, PyType};
+use rfm::diagnostic::Diagnostics;
 use rfm::experiment::{Every, Start, probe_column};
 use rfm::sph::{Checkpoint, Gauge, Simulation, StepError};
 use rfm::{Engine, Experiment};
@@ -34,7 +35,11 @@ pub struct PySimulation {
     program: Py<PyProgram>,
     experiment: Experiment,
     threads: Threads,
-    warnings: Py<PyTuple>,
+    /// Messages about the scene and its start.
+    at_start: Diagnostics,
+    /// Those, and the ones about obstacles that do not fit the particles. These take up to a second to find, so they
+    /// are found when somebody asks.
+    warnings: PyOnceLock<Py<PyTuple>>,
     state: Mutex<State>,
     now: Mutex<Now>,
 }
@@ -165,14 +170,12 @@ impl PySimulation {
         let started = run(py, threads, || {
             let experiment = Experiment::new(file, scene, Engine::Auto)?;
             let start = experiment.start()?;
-            let misfits = experiment.misfits();
-            Ok((experiment, start, misfits))
+            Ok((experiment, start))
         })?;
-        let (experiment, start, misfits) = started.map_err(|error| raised(py, error))?;
+        let (experiment, start) = started.map_err(|error| raised(py, error))?;
         let Start { mut simulation, warnings, .. } = start;
-        let mut found = experiment.warnings();
-        found.list.extend(misfits.list);
-        found.list.extend(warnings.list);
+        let mut at_start = experiment.warnings();
+        at_start.list.extend(warnings.list);
         let recorders = run(py, threads, || recorders(&experiment, &mut simulation, None))??;
         let now = Mutex::new(Now::of(&simulation));
         let state = State { simulation, recorders, failed: None, lent: Lent::default() };
@@ -180,7 +183,8 @@ impl PySimulation {
             program: program.clone().unbind(),
             experiment,
             threads,
-            warnings: diagnostics(py, &found)?.unbind(),
+            at_start,
+            warnings: PyOnceLock::new(),
             state: Mutex::new(state),
             now,
         })
@@ -279,11 +283,17 @@ impl PySimulation {
         &self.experiment.scene().name
     }
 
-    /// Messages about the scene and its start: a tuple of `Diagnostic`. ``rfm check`` also looks for parts of obstacles
-    /// that are too thin for the particles (W0508), and for formulas that jump.
+    /// Messages about the scene, its start, and obstacles that do not fit the particles: a tuple of `Diagnostic`. The
+    /// first question takes up to a second. ``rfm check`` also looks for formulas that jump.
     #[getter]
-    fn warnings(&self, py: Python<'_>) -> Py<PyTuple> {
-        self.warnings.clone_ref(py)
+    fn warnings(&self, py: Python<'_>) -> PyResult<Py<PyTuple>> {
+        let found = self.warnings.get_or_try_init(py, || {
+            let misfits = run(py, self.threads, || self.experiment.misfits())?;
+            let mut found = self.at_start.clone();
+            found.list.extend(misfits.list);
+            Ok::<_, PyErr>(diagnostics(py, &found)?.unbind())
+        })?;
+        Ok(found.clone_ref(py))
     }
 
     /// Simulated time, s.
