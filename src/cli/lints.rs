@@ -227,7 +227,6 @@ pub(super) fn of_scenes(
         };
         let experiment = match compiled {
             Ok(experiment) => experiment,
-            // perhaps an obstacle that moves says how fast the fluid will be: the run tells what is missing
             Err(Error::Diagnostics(refusal)) => {
                 // solids report tolerances themselves
                 // perhaps an obstacle that was left out says how fast the fluid will be
@@ -279,8 +278,8 @@ fn of_fluid(experiment: &Experiment) -> Vec<Diagnostic> {
     found
 }
 
-/// The same for a scene with so many obstacles that each is only asked whether it takes samples of the fluid. The
-/// experiment is that of the scene without them.
+/// Messages about the fluid's room in a scene with very many obstacles. They are not compiled, but each is asked
+/// whether it takes samples of the fluid. The experiment is that of the scene without them.
 fn among_many(program: &Program, scene: &Scene, experiment: &Experiment) -> Result<Vec<Diagnostic>, Error> {
     let mut found = experiment.foreseen();
     if found.iter().any(|diagnostic| diagnostic.severity == Severity::Error) {

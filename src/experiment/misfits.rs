@@ -33,7 +33,7 @@ const LOADED_WALL: f64 = 1.5;
 /// Walls and gaps as wide as this part of the limit are wide enough.
 const ALMOST: f64 = 0.999;
 
-/// Of scenes with more obstacles only the fluid's room is looked at: each obstacle would have a map of the box.
+/// Walls, gaps and reach are not looked at in scenes with more obstacles: each obstacle would need a map of the box.
 pub const MOST_OBSTACLES: usize = 50;
 
 impl Experiment {

@@ -392,7 +392,7 @@ pub(super) fn part_in_box(shape: &Solid, domain: &Aabb) -> Option<Aabb> {
     }
 }
 
-/// Of so many samples one is looked at, at most.
+/// Among many obstacles one sample in several is looked at, and one in this number at least.
 const SPARSEST: usize = 30;
 
 /// What obstacles take of a fluid's shape.
@@ -477,12 +477,12 @@ pub(super) fn has_surface<'a>(
     let (still, now) = (Crowd::of(still.into_iter()), Crowd::of(now.iter()));
     let later: Vec<Crowd> = later.iter().map(|bodies| Crowd::of(bodies.iter())).collect();
     let (min, size) = (scene.domain.min, scene.domain.size());
-    let (mut dry, mut wet, mut looked) = (0.0, 0.0, 0.0);
+    let (mut dry, mut wet, mut samples) = (0.0, 0.0, 0.0);
     // samples that bodies have left, less those that they have entered
     let mut left = vec![0.0; later.len()];
     for k in 1..=MOST_SAMPLES {
         let at = min + size * (f64::from(k) * SPREAD).fract();
-        looked += 1.0;
+        samples += 1.0;
         if !still.is_free(at) {
             continue;
         }
@@ -503,7 +503,7 @@ pub(super) fn has_surface<'a>(
         }
     }
     let changed = left.into_iter().map(f64::abs).fold(0.0, f64::max);
-    let particles = scene.domain.volume() * wet / looked / spacing.powi(3);
+    let particles = scene.domain.volume() * wet / samples / spacing.powi(3);
     dry + wet < LEAST_SAMPLES || particles < FEWEST || dry + changed >= (LEAST_ROOM - 1.0) * wet
 }
 

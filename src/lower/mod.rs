@@ -82,10 +82,17 @@ pub struct Options {
 impl Options {
     /// How a param is given a value where it is given one now: by `-D d=8mm`, or by a line of a file.
     fn setting(&self, name: &str, value: &str) -> String {
+        let written = self.written(name, value);
         match self.places.get(name) {
-            None => format!("write -D {name}=\"{value}\""),
-            Some(place) => format!("write {name} = \"{value}\" at {place}"),
+            None => format!("write {written}"),
+            Some(place) => format!("write {written} at {place}"),
         }
+    }
+
+    /// The words that give a param a value, in a file or after the command.
+    fn written(&self, name: &str, value: &str) -> String {
+        let in_file = self.places.contains_key(name);
+        if in_file { format!("{name} = \"{value}\"") } else { format!("-D {name}=\"{value}\"") }
     }
 
     /// A message about the value that a param is given, with the place of that value if it stands in a file.
@@ -310,18 +317,11 @@ impl<'a> Lowering<'a> {
                 let message = options.about_setting(name, message);
                 self.report(
                     Diagnostic::warning(Code::BARE_OVERRIDE, param.span, message).at("declared here").help(
-                        match options.places.contains_key(name) {
-                            false => format!(
-                                "write -D {name}=\"{}\", or -D {name}=\"{} {text}\" if that is meant",
-                                param.shown(param.value),
-                                param.value
-                            ),
-                            true => format!(
-                                "write {name} = \"{}\", or {name} = \"{} {text}\" if that is meant",
-                                param.shown(param.value),
-                                param.value
-                            ),
-                        },
+                        format!(
+                            "write {}, or {} if that is meant",
+                            options.written(name, &param.shown(param.value).to_string()),
+                            options.written(name, &format!("{} {text}", param.value))
+                        ),
                     ),
                 );
             }

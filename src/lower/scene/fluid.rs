@@ -210,7 +210,7 @@ impl<'a> Lowering<'a> {
             self.report(
                 Diagnostic::warning(Code::FLUID_OF_TIME, at, message)
                     .at("its shape at t = 0 is filled")
-                    .help("to bring the fluid in motion state its `velocity`, or move an obstacle"),
+                    .help("to bring the fluid into motion, state its `velocity` or move an obstacle"),
             );
         }
     }
