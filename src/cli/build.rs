@@ -11,6 +11,8 @@ use super::shared::Shared;
 use super::{choose, input, output};
 use crate::cli::output::Shown;
 use rfm::codegen::CodegenError;
+use rfm::diagnostic::{Code, Diagnostic, Diagnostics};
+use rfm::ir::Expr;
 use rfm::source::{self, ObjectError, Param, Target};
 use rfm::{Program, Solid};
 
@@ -35,6 +37,10 @@ pub(super) fn run(shared: &Shared, options: &Options) -> Result<(), Failure> {
     }
     let program = input::program(shared, &options.file)?;
     let solid = choose::solid(shared, &program, options.solid.as_deref())?;
+    if let Some(diagnostics) = without_formulas(&program, &solid) {
+        input::show(&diagnostics);
+        return Err(Failure::Findings);
+    }
     let (solid, params) = if options.runtime_params { open(&program, &solid)? } else { (solid, Vec::new()) };
     let text_options = text_options(&program, &solid, options, params);
     let made = match kind {
@@ -71,6 +77,25 @@ pub(super) fn run(shared: &Shared, options: &Options) -> Result<(), Failure> {
         ));
     }
     report(shared, &solid, &files, made.operations)
+}
+
+/// A message for each part of a solid that is looked up in a table; `None` if all of it is formulas.
+fn without_formulas(program: &Program, solid: &Solid) -> Option<Diagnostics> {
+    let module = program.module();
+    let root = module.solids.iter().find(|known| known.name == solid.name())?.node;
+    let used = module.graph.reachable(&[root]);
+    let lookups = module.graph.nodes().filter(|(node, _)| used[node.index()]);
+    let list: Vec<Diagnostic> = lookups
+        .filter_map(|(node, expr)| {
+            let Expr::Lookup(lookup, _) = expr else { return None };
+            let what = module.graph.tables()[lookup.table as usize].what();
+            let message = format!("`{}` cannot be written as source: it has {what}", solid.name());
+            let help = "`rfm mesh` writes its surface, and programs in Rust, C and Python evaluate it through the library";
+            let diagnostic = Diagnostic::error(Code::NO_FORMULA, module.graph.span(node)?, message);
+            Some(diagnostic.at("looked up in a table, which is no formula").help(help))
+        })
+        .collect();
+    (!list.is_empty()).then(|| Diagnostics { list, sources: program.sources().to_vec().into() })
 }
 
 /// Refuses to replace a header that this command has not made, because the user did not name it.

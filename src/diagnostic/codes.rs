@@ -132,6 +132,14 @@ by `or`. The message says what is wrong, and where.
 IMPORT = "E0218":
 "An `import` takes the solids, functions, params and names of another file of this language. Files cannot import one
 another in a circle, and a mesh is read by `mesh(…)` instead.";
+NO_FORMULA = "E0219":
+"`rfm build` writes formulas, and a mesh or a height map from a file is looked up in a table that is no formula. Leave the
+part out, or write it as a formula: a ground by `x`, `y` and `sin`, a body by the solids of the language. `rfm mesh` writes
+the surface of the whole solid for other programs, and programs in Rust, C and Python load the file itself through the
+library: they have ω, ∇ω and contacts of every solid.
+
+    rfm 1
+    solid part = mesh(\"part.stl\", 1 mm)";
 SCENE_KEY = "E0301":
 "The scene does not know this key, or this value of it, at this place. What it knows:
 

@@ -222,6 +222,23 @@ fn five_hundred_parts_are_compiled_in_seconds_and_have_the_bits_of_rfm() {
 }
 
 #[test]
+fn a_part_that_is_no_formula_is_shown() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = "rfm 1\nlet ground = height_map(\"ground.csv\", [0, 0], [4, 3])\nsolid hill = ground or sphere(1)\n\
+                solid free = sphere(1)\n";
+    std::fs::write(folder.path().join("a.rfm"), file).unwrap();
+    std::fs::write(folder.path().join("ground.csv"), "0,1\n1,0\n").unwrap();
+    let refused = rfm(folder.path(), &["build", "a.rfm", "-s", "hill", "-o", "hill.c"]).transcript();
+    for part in ["E0219", "`hill` cannot be written as source: it has a height map", "a.rfm:2:25", "rfm mesh"]
+    {
+        assert!(refused.contains(part), "{part}\n{refused}");
+    }
+    assert!(!folder.path().join("hill.c").exists());
+    rfm(folder.path(), &["build", "a.rfm", "-s", "free", "-o", "free.c"]);
+    assert!(folder.path().join("free.c").exists());
+}
+
+#[test]
 fn a_header_is_c_and_cplusplus_and_cuda_is_cplusplus() {
     let solid = example_solids().remove(0);
     let workshop = Workshop::new();
