@@ -2,7 +2,9 @@
 
 use std::collections::BTreeSet;
 
-use super::c_blocks::{self, Blocks};
+use super::c_blocks::Blocks;
+use super::c_folds::Folds;
+use super::c_room::Room;
 use super::language::{C, Function};
 use super::operations::{Names, Operation, WEIGHTED_FIELDS};
 use super::program::{Program, Question};
@@ -10,6 +12,9 @@ use super::statements::{Part, Statements, Writer};
 use super::{File, Math, OpenParam, PARAMS, SourceError};
 use crate::ir::Forms;
 use crate::precision::Precision;
+
+/// A function with more operations than this is divided: gcc -O3 needs time that grows faster than its length.
+const LONGEST_FUNCTION: usize = 1500;
 
 /// The kinds of files.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -51,13 +56,12 @@ pub(super) fn source(file: &File<'_>, flavour: Flavour) -> Result<String, Source
         called.extend(uniforms.functions.iter().map(|&function| (function, false)));
         functions.extend(uniforms.lines);
         for &precision in file.precisions {
-            let blocks = writer.blocks(program, precision);
-            let body = writer.body(program, precision, blocks.as_ref())?;
+            let (body, room) = writer.body(program, precision)?;
             operations.extend(body.operations.iter().map(|&op| (op, precision == Precision::F32)));
             called.extend(body.functions.iter().map(|&function| (function, precision == Precision::F32)));
             functions.extend(body.lines);
-            functions.extend(writer.point(program, precision, blocks.as_ref()));
-            functions.extend(writer.columns(program, precision, blocks.as_ref()));
+            functions.extend(writer.point(program, precision, room.as_ref()));
+            functions.extend(writer.columns(program, precision, room.as_ref()));
             if flavour == Flavour::Cuda {
                 functions.extend(writer.kernel(program, precision));
             }
@@ -384,28 +388,32 @@ impl CFile<'_> {
         format!("{}_at_{}{}", self.file.prefix, program.question.name(), C.suffix(precision))
     }
 
-    /// The blocks of a program that is too long for one function.
-    fn blocks(&self, program: &Program, precision: Precision) -> Option<Blocks> {
-        if self.flavour == Flavour::Cuda || program.operations() <= c_blocks::LONGEST_FUNCTION {
-            return None;
+    /// A program that is too long for one function, and the room that its blocks of points need: in parts where it has them,
+    /// or as a chain, whichever has the shorter functions.
+    fn long(&self, program: &Program, precision: Precision) -> Result<(Statements, Room), SourceError> {
+        let (names, name) = (self.names(), self.at_name(program, precision));
+        let uniform = |i: u32| format!("u[{i}]");
+        let writer = self.writer(&names, precision, &uniform, &|_| String::new());
+        let folds = Folds::of(program, precision);
+        let chain = folds.write(&writer, &name, program)?;
+        if let Some(blocks) = Blocks::of(program, precision) {
+            let parts = blocks.write(&writer, &name, program)?;
+            if parts.length < chain.length {
+                return Ok((parts.made, blocks.room));
+            }
         }
-        Blocks::of(program, precision)
+        Ok((chain.made, folds.room))
     }
 
-    fn body(
-        &self,
-        program: &Program,
-        precision: Precision,
-        blocks: Option<&Blocks>,
-    ) -> Result<Body, SourceError> {
+    fn body(&self, program: &Program, precision: Precision) -> Result<(Body, Option<Room>), SourceError> {
+        if self.flavour != Flavour::Cuda && program.operations() > LONGEST_FUNCTION {
+            let (Statements { lines, operations, functions, .. }, room) = self.long(program, precision)?;
+            return Ok((Body { lines, operations, functions }, Some(room)));
+        }
         let names = self.names();
         let parameter = |_: u32| String::new();
         let uniform = |i: u32| format!("u[{i}]");
         let writer = self.writer(&names, precision, &uniform, &parameter);
-        if let Some(blocks) = blocks {
-            let made = blocks.write(&writer, &self.at_name(program, precision), program)?;
-            return Ok(Body { lines: made.lines, operations: made.operations, functions: made.functions });
-        }
         let Program { graph, outputs, question, .. } = program;
         let part = Part { graph, inputs: &[], outputs, forms: program.forms(precision) };
         let Statements { lines: statements, outputs, operations, functions } = writer.statements(&part)?;
@@ -432,7 +440,7 @@ impl CFile<'_> {
             lines.insert(lines.len() - 1, "    (void)u;".into());
         }
         lines.push("}".into());
-        Ok(Body { lines, operations, functions })
+        Ok((Body { lines, operations, functions }, None))
     }
 
     /// The structure of ω and ∇ω.
@@ -441,7 +449,7 @@ impl CFile<'_> {
     }
 
     /// The function for one point.
-    pub fn point(&self, program: &Program, precision: Precision, blocks: Option<&Blocks>) -> Vec<String> {
+    pub fn point(&self, program: &Program, precision: Precision, room: Option<&Room>) -> Vec<String> {
         let question = program.question;
         let mut lines = vec![
             String::new(),
@@ -450,8 +458,8 @@ impl CFile<'_> {
         lines.extend(self.fill_uniforms(program, precision));
         let (number, name) = (C.number(precision), self.at_name(program, precision));
         let u = if program.uniforms.is_some() { ", u" } else { "" };
-        if let Some(blocks) = blocks {
-            lines.extend(blocks.point(&name, number, question));
+        if let Some(room) = room {
+            lines.extend(room.point(&name, number, question));
         } else if question == Question::Gradient {
             lines.push(format!("    const {} all = {name}(x, y, z{u});", self.answer(precision)));
             let parts = ["gx", "gy", "gz"].iter().enumerate();
@@ -465,7 +473,7 @@ impl CFile<'_> {
     }
 
     /// The function for columns.
-    fn columns(&self, program: &Program, precision: Precision, blocks: Option<&Blocks>) -> Vec<String> {
+    fn columns(&self, program: &Program, precision: Precision, room: Option<&Room>) -> Vec<String> {
         let question = program.question;
         let signature = self
             .columns_signature(question, precision)
@@ -475,8 +483,8 @@ impl CFile<'_> {
         lines.extend(self.fill_uniforms(program, precision));
         let (number, name) = (C.number(precision), self.at_name(program, precision));
         let u = if program.uniforms.is_some() { ", u" } else { "" };
-        if let Some(blocks) = blocks {
-            lines.extend(blocks.columns(&name, number, question));
+        if let Some(room) = room {
+            lines.extend(room.columns(&name, number, question));
             lines.push("}".into());
             return lines;
         }

@@ -9,38 +9,25 @@ use std::collections::HashMap;
 
 use super::SourceError;
 use super::c_chunks::{Chunk, chunks};
+use super::c_room::{Called, IN_COLUMNS, Long, Room};
 use super::language::C;
 use super::operations::{Operation, WEIGHTED_FIELDS};
-use super::program::{Program, Question};
+use super::program::Program;
 use super::statements::{Part, Statements, Writer};
 use crate::ir::{Axis, Binary, Expr, Form, Forms, Graph, Node};
 use crate::precision::Precision;
 use crate::solid::{BlockPlan, BlockStep, ColumnPlace, JoiningOperation, Piece};
 
-/// A function with more operations than this is divided: gcc -O3 needs time that grows faster than its length.
-pub(super) const LONGEST_FUNCTION: usize = 1500;
-
-/// Greatest count of numbers that a block keeps at a time, over all its points: most of a first-level cache.
-const CACHED_BYTES: usize = 24 << 10;
-
-/// Least and greatest number of points of a block.
-const SHORTEST: usize = 32;
-const LONGEST: usize = 256;
-
-/// How the functions of a block write the coordinates of a point.
-const IN_COLUMNS: [&str; 4] = ["x[i]", "y[i]", "z[i]", "t"];
+/// A plan with more constants for each node than this is refused: its parts hold one another, as those of folds by
+/// `blend` do, and the table grows with the square of their number.
+const MOST_CONSTANTS: usize = 2;
 
 /// A program as steps.
 pub(super) struct Blocks {
     plan: BlockPlan,
     steps: Vec<Step>,
-    /// Columns of a block: those of the plan, and those that the chunks of long pieces hand on.
-    columns: usize,
-    precision: Precision,
-    /// Points of a block.
-    points: usize,
-    /// Whether the functions take what depends on time and params alone.
-    has_uniforms: bool,
+    /// Its columns are those of the plan, and those that the chunks of long pieces hand on.
+    pub room: Room,
 }
 
 /// A step of the plan, or a part of one.
@@ -66,16 +53,6 @@ enum Action {
     Copy,
 }
 
-/// A function that steps call.
-struct Called {
-    name: String,
-    /// Whether it is a piece of arithmetic, which is given the points.
-    is_piece: bool,
-    has_constants: bool,
-    /// How many columns it is given.
-    columns: usize,
-}
-
 /// What is written for the steps.
 #[derive(Default)]
 struct Written {
@@ -90,9 +67,12 @@ struct Written {
 }
 
 impl Blocks {
-    /// `None` if the graph has no parts that would be steps.
+    /// `None` if the graph has no parts that would be steps, or none that are apart.
     pub fn of(program: &Program, precision: Precision) -> Option<Self> {
         let plan = BlockPlan::new(&program.graph, &program.outputs, program.forms(precision))?;
+        if plan.constants.len() > MOST_CONSTANTS * program.graph.len() {
+            return None;
+        }
         let mut columns = plan.columns;
         let mut steps = Vec::with_capacity(plan.steps.len());
         for step in &plan.steps {
@@ -101,22 +81,11 @@ impl Blocks {
                 None => steps.push(Step::Planned(step.clone())),
             }
         }
-        let size = match precision {
-            Precision::F64 => 8,
-            Precision::F32 => 4,
-        };
-        let fitting = CACHED_BYTES / (size * columns.max(1));
-        let points = (fitting / SHORTEST * SHORTEST).clamp(SHORTEST, LONGEST);
-        Some(Self { plan, steps, columns, precision, points, has_uniforms: program.uniforms.is_some() })
+        Some(Self { plan, steps, room: Room::new(precision, columns, program.uniforms.is_some()) })
     }
 
     /// The functions and tables: in the end a function that evaluates one block.
-    pub fn write(
-        &self,
-        writer: &Writer<'_>,
-        name: &str,
-        program: &Program,
-    ) -> Result<Statements, SourceError> {
+    pub fn write(&self, writer: &Writer<'_>, name: &str, program: &Program) -> Result<Long, SourceError> {
         let mut written = Written { constants: self.plan.constants.clone(), ..Written::default() };
         for step in &self.steps {
             match step {
@@ -134,23 +103,9 @@ impl Blocks {
             }
         }
         let Written { mut made, called, constants, table, .. } = written;
-        let lines = &mut made.lines;
-        let number = C.number(self.precision);
-        if !constants.is_empty() {
-            let constants: Vec<String> =
-                constants.iter().filter_map(|&value| C.constant(value, self.precision)).collect();
-            lines.push(String::new());
-            lines.push(format!("static const {number} {name}_constants[{}] = {{", constants.len()));
-            lines.extend(constants.chunks(8).map(|row| format!("    {},", row.join(", "))));
-            lines.push("};".into());
-        }
-        let numbers: Vec<String> = table.iter().chain([&0]).map(ToString::to_string).collect();
-        lines.push(String::new());
-        lines.push(format!("static const int {name}_steps[{}] = {{", numbers.len()));
-        lines.extend(numbers.chunks(20).map(|row| format!("    {},", row.join(", "))));
-        lines.push("};".into());
-        self.run(name, &called, lines);
-        Ok(made)
+        let length = made.lines.len();
+        self.room.tables(name, &called, (&constants, &table), &mut made.lines);
+        Ok(Long { made, length })
     }
 
     /// The number of the function for what a step of the plan does, which is written if it is new.
@@ -204,7 +159,7 @@ impl Blocks {
         let known = written.chunks.get(&text).copied();
         let called = known.unwrap_or_else(|| {
             let counts = [chunk.reads.len(), chunk.writes.len()];
-            self.loop_of(name, counts, has_constants, &body, &mut written.made);
+            self.room.loop_of(name, counts, has_constants, &body, &mut written.made);
             let columns = chunk.reads.len() + chunk.writes.len();
             written.called.push(Called { name: name.into(), is_piece: true, has_constants, columns });
             written.chunks.insert(text, written.called.len() - 1);
@@ -237,43 +192,8 @@ impl Blocks {
         let part = Part { graph, inputs: &inputs, outputs: &piece.outputs, forms: &forms };
         let body = writer.statements(&part)?;
         let counts = [piece.inputs.len(), piece.outputs.len()];
-        self.loop_of(name, counts, piece.parameters > 0, &body, made);
+        self.room.loop_of(name, counts, piece.parameters > 0, &body, made);
         Ok(())
-    }
-
-    /// A function that computes statements for the points of a block.
-    fn loop_of(
-        &self,
-        name: &str,
-        [reads, writes]: [usize; 2],
-        has_constants: bool,
-        body: &Statements,
-        made: &mut Statements,
-    ) {
-        made.operations.extend(&body.operations);
-        made.functions.extend(&body.functions);
-        let number = C.number(self.precision);
-        let mut arguments = vec!["size_t n".to_string()];
-        arguments.extend(["x", "y", "z"].map(|axis| format!("const {number} *RFM_RESTRICT {axis}")));
-        if self.has_uniforms {
-            arguments.push(format!("const {number} *RFM_RESTRICT u"));
-        }
-        if has_constants {
-            arguments.push(format!("const {number} *RFM_RESTRICT c"));
-        }
-        arguments.extend((0..reads).map(|i| format!("const {number} *RFM_RESTRICT r{i}")));
-        arguments.extend((0..writes).map(|i| format!("{number} *RFM_RESTRICT w{i}")));
-        let lines = &mut made.lines;
-        lines.push(String::new());
-        lines.push(format!("RFM_NOINLINE void {name}({}) {{", arguments.join(", ")));
-        lines.push("    size_t i;".into());
-        let unused = [("u", self.has_uniforms), ("c", has_constants)];
-        let unused = unused.iter().filter(|(_, is)| *is).map(|(name, _)| format!(" (void){name};"));
-        lines.push(format!("    (void)x; (void)y; (void)z;{}", unused.collect::<String>()));
-        lines.push("    for (i = 0; i < n; i++) {".into());
-        lines.extend(body.lines.iter().map(|line| format!("        {line}")));
-        lines.extend(body.outputs.iter().enumerate().map(|(i, text)| format!("        w{i}[i] = {text};")));
-        lines.extend(["    }".into(), "}".to_string()]);
     }
 
     /// The loop of an operation that joins columns.
@@ -284,7 +204,7 @@ impl Blocks {
         writer: &Writer<'_>,
         made: &mut Statements,
     ) -> Result<(), SourceError> {
-        let number = C.number(self.precision);
+        let number = C.number(self.room.precision);
         let column = |name: &str| format!("const {number} *RFM_RESTRICT {name}");
         let result = |name: &str| format!("{number} *RFM_RESTRICT {name}");
         let (arguments, body) = match action {
@@ -308,8 +228,8 @@ impl Blocks {
                 let Some(r0) = op.r0() else { unreachable!("{op:?} has no weights") };
                 let operation = Operation::Weighted(r0.into(), form.into());
                 made.operations.insert(operation);
-                let joint = writer.names.joint(&C, self.precision);
-                let call = writer.names.operation(operation, &C, self.precision);
+                let joint = writer.names.joint(&C, self.room.precision);
+                let call = writer.names.operation(operation, &C, self.room.precision);
                 let mut body = vec![format!("const {joint} all = {call}(a[i], b[i]);")];
                 body.extend(WEIGHTED_FIELDS.map(|field| format!("{field}[i] = all.{field};")));
                 let mut arguments = vec![column("a"), column("b")];
@@ -324,89 +244,6 @@ impl Blocks {
         made.lines.extend(body.into_iter().map(|line| format!("        {line}")));
         made.lines.extend(["    }".into(), "}".to_string()]);
         Ok(())
-    }
-
-    /// The function that takes the steps for one block of points. Columns of the caller are −1, −2 …
-    fn run(&self, name: &str, called: &[Called], lines: &mut Vec<String>) {
-        let number = C.number(self.precision);
-        let u = if self.has_uniforms { format!(", const {number} *u") } else { String::new() };
-        lines.push(String::new());
-        lines.push("/* n points, as many as a column of its own has room for: stride. */".into());
-        lines.push(format!(
-            "static void {name}(size_t n, const {number} *x, const {number} *y, const {number} *z{u}, \
-             {number} *columns, size_t stride, {number} *const *out) {{"
-        ));
-        lines.push(format!("    const int *s = {name}_steps;"));
-        lines.push(
-            "#define RFM_COLUMN(k) (s[k] < 0 ? out[-1 - s[k]] : columns + (size_t)s[k] * stride)".into(),
-        );
-        lines.push("    while (*s) {".into());
-        lines.push("        switch (*s++) {".into());
-        for (i, function) in called.iter().enumerate() {
-            let mut arguments = vec!["n".to_string()];
-            if function.is_piece {
-                arguments.extend(["x", "y", "z"].map(String::from));
-                arguments.extend(self.has_uniforms.then(|| "u".to_string()));
-            }
-            arguments.extend(function.has_constants.then(|| format!("{name}_constants + s[0]")));
-            let first = usize::from(function.has_constants);
-            let last = first + function.columns;
-            arguments.extend((first..last).map(|k| format!("RFM_COLUMN({k})")));
-            lines.push(format!("        case {}:", i + 1));
-            lines.push(format!("            {}({});", function.name, arguments.join(", ")));
-            lines.push(format!("            s += {last};"));
-            lines.push("            break;".into());
-        }
-        lines.extend(["        default:", "            return;", "        }", "    }"].map(String::from));
-        lines.push("#undef RFM_COLUMN".into());
-        lines.push("}".into());
-    }
-
-    /// The body of the function for one point.
-    pub fn point(&self, name: &str, number: &str, question: Question) -> Vec<String> {
-        let results = question.results();
-        let u = self.uniforms_argument();
-        let mut lines = vec![format!("    {number} columns[{}];", self.columns.max(1))];
-        lines.push(format!("    {number} all[{}];", results.len()));
-        let places: Vec<String> = (0..results.len()).map(|i| format!("all + {i}")).collect();
-        lines.push(format!("    {number} *out[{}];", results.len()));
-        lines.extend(places.iter().enumerate().map(|(i, place)| format!("    out[{i}] = {place};")));
-        lines.push(format!("    {name}(1, &x, &y, &z{u}, columns, 1, out);"));
-        if question == Question::Gradient {
-            lines.extend((0..3).map(|i| format!("    gradient[{i}] = all[{}];", i + 1)));
-        }
-        lines.push("    return all[0];".into());
-        lines
-    }
-
-    /// The body of the function for columns.
-    pub fn columns(&self, name: &str, number: &str, question: Question) -> Vec<String> {
-        let results = question.results();
-        let u = self.uniforms_argument();
-        let (points, columns) = (self.points, self.columns.max(1));
-        let mut lines = vec![
-            "    size_t at;".to_string(),
-            format!(
-                "    {number} *columns = ({number} *)malloc((size_t){columns} * {points} * sizeof({number}));"
-            ),
-            "    if (!columns) {".into(),
-            "        for (at = 0; at < n; at++) {".into(),
-        ];
-        lines.extend(results.iter().map(|result| format!("            {result}[at] = NAN;")));
-        lines.extend(["        }", "        return;", "    }"].map(String::from));
-        lines.push(format!("    for (at = 0; at < n; at += {points}) {{"));
-        lines.push(format!("        const size_t m = n - at < {points} ? n - at : {points};"));
-        lines.push(format!("        {number} *out[{}];", results.len()));
-        lines.extend(
-            results.iter().enumerate().map(|(i, result)| format!("        out[{i}] = {result} + at;")),
-        );
-        lines.push(format!("        {name}(m, x + at, y + at, z + at{u}, columns, {points}, out);"));
-        lines.extend(["    }", "    free(columns);"].map(String::from));
-        lines
-    }
-
-    fn uniforms_argument(&self) -> &'static str {
-        if self.has_uniforms { ", u" } else { "" }
     }
 }
 

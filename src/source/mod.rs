@@ -17,7 +17,10 @@
 //! | `language` | the table of languages: numbers, declarations, functions |
 //! | `operations` | R₀ and other operations that are functions of a file, each written once for all languages |
 //! | `statements` | a graph as a list of declarations |
-//! | `c`, `c_blocks`, `c_chunks`, `rust`, `shader` | whole files: heads, parameters, one point and columns |
+//! | `c`, `rust`, `shader` | whole files: heads, parameters, one point and columns |
+//! | `c_blocks`, `c_chunks` | long formulas of C in parts |
+//! | `c_folds`, `c_links` | long formulas of C as chains |
+//! | `c_room` | the columns of blocks of points, and the tables of steps over them |
 //! | `march` | functions for a ray-marcher: sign, gradient and range of ω |
 //! | `object`, `c_object` | object code with its header |
 //! | `names` | which names a file may use |
@@ -28,7 +31,10 @@
 mod c;
 mod c_blocks;
 mod c_chunks;
+mod c_folds;
+mod c_links;
 mod c_object;
+mod c_room;
 mod language;
 mod march;
 mod names;

@@ -26,7 +26,7 @@ pub(super) enum Operation {
 }
 
 /// ∧ or ∨
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub(super) enum Junction {
     And,
     Or,

@@ -59,7 +59,7 @@ impl Writer<'_> {
     pub fn statements(&self, part: &Part<'_>) -> Result<Statements, SourceError> {
         let texts = part.inputs.iter().cloned().collect();
         let mut state =
-            State { writer: self, part, made: Statements::default(), texts, joints: HashSet::new() };
+            State { writer: self, part, made: Statements::default(), texts, joints: HashMap::new() };
         let needed = state.needed();
         let weighted = weighted_pairs(part.graph, &needed);
         for &node in &needed {
@@ -87,8 +87,8 @@ struct State<'a> {
     part: &'a Part<'a>,
     made: Statements,
     texts: HashMap<Node, String>,
-    /// Names of values with their weights that are declared already.
-    joints: HashSet<String>,
+    /// Names of values with their weights that are declared already, by their operands.
+    joints: HashMap<(Node, Node, Junction), String>,
 }
 
 impl State<'_> {
@@ -186,13 +186,22 @@ impl State<'_> {
             self.declare(language.number(precision), &name, &value);
             return name;
         }
-        let kind = if junction == Junction::And { "and" } else { "or" };
-        let joint = format!("{}_{kind}{}_{}", self.writer.values, first.index(), second.index());
-        if self.joints.insert(joint.clone()) {
-            let operands = format!("{}, {}", self.texts[&first], self.texts[&second]);
-            let value = self.operation(Operation::Weighted(junction, style), &operands);
-            self.declare(&names.joint(language, precision), &joint, &value);
-        }
+        let joint = match self.joints.get(&(first, second, junction)) {
+            Some(joint) => joint.clone(),
+            None => {
+                let kind = if junction == Junction::And { "and" } else { "or" };
+                let numbers = match self.writer.gathered {
+                    Some(_) => self.made.lines.len().to_string(),
+                    None => format!("{}_{}", first.index(), second.index()),
+                };
+                let joint = format!("{}_{kind}{numbers}", self.writer.values);
+                let operands = format!("{}, {}", self.texts[&first], self.texts[&second]);
+                let value = self.operation(Operation::Weighted(junction, style), &operands);
+                self.declare(&names.joint(language, precision), &joint, &value);
+                self.joints.insert((first, second, junction), joint.clone());
+                joint
+            }
+        };
         let field = match r0 {
             R0::AndWeight | R0::OrWeight if u == first => "by_u",
             R0::AndWeight | R0::OrWeight => "by_v",

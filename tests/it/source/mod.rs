@@ -221,6 +221,46 @@ fn five_hundred_parts_are_compiled_in_seconds_and_have_the_bits_of_rfm() {
     }
 }
 
+/// Long folds that have no parts of R₀, alone and within R₀, and one whose members hold the others.
+fn folds() -> Vec<Solid> {
+    let square = "((x - 2*sin(i*1.7))^2 + (y - 2*cos(i*2.3))^2 + (z - i/500)^2)";
+    let mut text = format!(
+        "rfm 1\nsolid blobs = (sum i in 0..200: 0.01/{square}) >= 0.5\n\
+         solid surface = (product i in 0..200: {square}) <= 0.1\n\
+         solid hills = (sum i in 0..300: abs(x*cos(i) + y*sin(i) - i/500)) <= 100 and z <= 1 or ball([0, 0, 1], 0.3)\n\
+         let b0 = sphere(0.3)\n"
+    );
+    for i in 1..100 {
+        text += &format!("let b{i} = blend(b{}, ball([{i}/50, 0.3*sin({i}), z/9], 0.2), 0.05)\n", i - 1);
+    }
+    text += "solid chain = b99\n";
+    let program = Program::from_source("s.rfm", text).unwrap_or_else(|e| panic!("{e}"));
+    let solid = |name: &&str| program.solid_with(name, Engine::Jit).unwrap();
+    ["blobs", "surface", "hills", "chain"].iter().map(solid).collect()
+}
+
+#[test]
+fn long_folds_are_short_texts_and_have_the_bits_of_rfm() {
+    for solid in folds() {
+        // straight lines of the longest would be 40 000
+        let lines = c_text(&solid, "s").lines().count();
+        assert!(lines < 20_000, "{solid:?}: {lines} lines");
+    }
+    for compiler in compilers() {
+        let counts = compare_c(compiler, &folds(), FEW / 4);
+        assert_eq!(counts.different, 0, "{compiler}: {counts:?}");
+    }
+}
+
+#[test]
+#[ignore = "a million points for each of four long folds: minutes"]
+fn long_folds_have_the_bits_of_rfm_at_a_million_points() {
+    for compiler in compilers() {
+        let counts = compare_c(compiler, &folds(), MANY);
+        assert_eq!(counts.different, 0, "{compiler}: {counts:?}");
+    }
+}
+
 #[test]
 fn a_part_that_is_no_formula_is_shown() {
     let folder = tempfile::tempdir().unwrap();
