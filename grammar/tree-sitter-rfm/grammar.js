@@ -8,6 +8,7 @@ const UNITS = [
 ];
 
 // weakest first
+// the fold and the choice take everything to their right
 const BINDS = { fold: 0, or: 1, and: 2, not: 3, compare: 4, sum: 5, product: 6, sign: 7, power: 8, postfix: 9 };
 
 const separated = (rule) => optional(seq(rule, repeat(seq(",", rule)), optional(",")));
@@ -49,7 +50,7 @@ module.exports = grammar({
 
     _expression: ($) =>
       choice(
-        $.logic, $.negation, $.comparison, $.sum, $.product, $.sign, $.power, $.postfix, $.fold,
+        $.logic, $.negation, $.comparison, $.sum, $.product, $.sign, $.power, $.postfix, $.fold, $.choice,
         $.quantity, $.number, $.text, $.vector, $.call, $._name, $.group,
       ),
     logic: ($) =>
@@ -86,6 +87,11 @@ module.exports = grammar({
         BINDS.fold,
         seq(choice(...FOLDS), field("variable", $.name), "in", $._expression, optional(seq("..", $._expression)), ":",
           $._expression),
+      ),
+    choice: ($) =>
+      prec(
+        BINDS.fold,
+        seq("if", field("condition", $._expression), "then", $._expression, "else", $._expression),
       ),
     group: ($) => seq("(", $._expression, ")"),
     vector: ($) => seq("[", separated($._expression), "]"),

@@ -1,4 +1,4 @@
-//! `where(condition, a, b)`: one of two values, by a condition that is known now or differs from point to point.
+//! `where(condition, a, b)` and `if condition then a else b`: one of two values, by a condition that is known now or differs from point to point.
 
 use super::lowering::Lowering;
 use super::value::Value;
@@ -20,7 +20,10 @@ impl Lowering<'_> {
     pub fn choose(&mut self, condition: &Expr, values: [&Expr; 2], span: Span) -> Value {
         match self.condition(condition) {
             None => Value::Failed,
-            Some(Condition::Known(holds)) => self.expr(values[usize::from(!holds)]),
+            Some(Condition::Known(holds)) => {
+                self.count_as_used(values[usize::from(holds)]);
+                self.expr(values[usize::from(!holds)])
+            }
             Some(Condition::Field(field)) => {
                 let [first, second] = values.map(|value| self.expr(value));
                 let counts = self.step(field, span);
@@ -126,7 +129,8 @@ impl Lowering<'_> {
             | ExprKind::Member { .. }
             | ExprKind::Method { .. }
             | ExprKind::Index { .. }
-            | ExprKind::Fold { .. } => None,
+            | ExprKind::Fold { .. }
+            | ExprKind::Choice { .. } => None,
         }
     }
 

@@ -90,6 +90,10 @@ impl Lowering<'_> {
             }
             ExprKind::Index { list, index } => self.index(list, index, span),
             ExprKind::Fold { op, variable, members, body } => self.fold(*op, variable, members, body, span),
+            ExprKind::Choice { condition, values } => {
+                let [first, second] = &**values;
+                self.choose(condition, [first, second], span)
+            }
         }
     }
 

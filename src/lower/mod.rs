@@ -548,17 +548,6 @@ impl<'a> Lowering<'a> {
         true
     }
 
-    fn unused(&mut self) {
-        let unused = self.names.unused();
-        for (name, kind, span) in unused {
-            self.report(
-                Diagnostic::warning(Code::UNUSED, span, format!("{kind} `{name}` is never used"))
-                    .help(format!("remove it, or write `_{name}`"))
-                    .edit(span, &name, format!("_{name}"), false),
-            );
-        }
-    }
-
     fn unknown_overrides(&mut self, (ast, imported): (&Ast, &[Imported]), options: &Options) {
         let files = imported.iter().map(|file| (format!("{}.", file.qualified), &file.ast));
         let all = std::iter::once((String::new(), ast)).chain(files);
@@ -591,11 +580,16 @@ impl<'a> Lowering<'a> {
     }
 }
 
-/// The unit of an expression that is one number with a unit, and how it was written.
+/// The unit of an expression that is one number with a unit, or a choice of two, and how it was written.
 fn unit_of(expr: &Expr) -> Option<(Unit, &str)> {
     match &expr.kind {
         ExprKind::Quantity { unit, .. } => Some((parse_unit(&unit.text)?, &unit.text)),
         ExprKind::Negate(inner) => unit_of(inner),
+        // both values have one unit, as in `if steep == 1 then 45 deg else 30 deg`
+        ExprKind::Choice { values, .. } => {
+            let [first, second] = values.each_ref().map(unit_of);
+            first.filter(|(unit, _)| second.is_some_and(|(other, _)| other == *unit))
+        }
         _ => None,
     }
 }

@@ -175,6 +175,7 @@ impl Lowering<'_> {
             | ExprKind::Not(_)
             | ExprKind::Compare { .. } => true,
             ExprKind::Fold { op, .. } => matches!(op, Fold::Any | Fold::All),
+            ExprKind::Choice { values, .. } => values.iter().all(|value| self.is_shape(value)),
             ExprKind::Number(_)
             | ExprKind::Quantity { .. }
             | ExprKind::Text(_)

@@ -1,10 +1,22 @@
-//! Parameters of functions and variables of folds that nothing uses.
+//! Names, parameters of functions and variables of folds that nothing uses.
 
 use super::lowering::Lowering;
 use crate::diagnostic::{Code, Diagnostic};
-use crate::syntax::ast::{Entry, Expr, ExprKind, Function, Item};
+use crate::syntax::ast::{Entry, Expr, ExprKind, Function, Item, Name};
 
 impl Lowering<'_> {
+    /// Warns of names that nothing mentions.
+    pub fn unused(&mut self) {
+        let unused = self.names.unused();
+        for (name, kind, span) in unused {
+            self.report(
+                Diagnostic::warning(Code::UNUSED, span, format!("{kind} `{name}` is never used"))
+                    .help(format!("remove it, or write `_{name}`"))
+                    .edit(span, &name, format!("_{name}"), false),
+            );
+        }
+    }
+
     /// Warns of local names of an item that its expressions do not mention.
     pub fn unused_locals(&mut self, item: &Item) {
         match item {
@@ -24,6 +36,35 @@ impl Lowering<'_> {
                 Entry::Setting { value, .. } => self.unused_variables(value),
                 Entry::Block { entries, .. } => self.unused_in_entries(entries),
             }
+        }
+    }
+
+    /// Counts the names of an expression as used that is not evaluated.
+    pub fn count_as_used(&mut self, expr: &Expr) {
+        let source = self.scope.source;
+        match &expr.kind {
+            ExprKind::Name(name) | ExprKind::Call { function: Name { text: name, .. }, .. } => {
+                let is_local = self.scope.locals.iter().any(|local| local.name == *name);
+                if !is_local {
+                    self.names.get(source, name);
+                }
+            }
+            ExprKind::Method { receiver, method, .. } => {
+                self.names.function_of_shapes(source, &method.text);
+                self.count_file_as_used(receiver);
+            }
+            ExprKind::Member { of, .. } => self.count_file_as_used(of),
+            _ => {}
+        }
+        for part in expr.children() {
+            self.count_as_used(part);
+        }
+    }
+
+    /// Counts an imported file as used whose name stands in front of a dot.
+    fn count_file_as_used(&mut self, of: &Expr) {
+        if let ExprKind::Name(name) = &of.kind {
+            self.names.import(self.scope.source, name);
         }
     }
 

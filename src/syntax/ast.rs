@@ -179,6 +179,11 @@ pub enum ExprKind {
         members: Members,
         body: Box<Expr>,
     },
+    /// `if condition then a else b`, the same as `where(condition, a, b)`.
+    Choice {
+        condition: Box<Expr>,
+        values: Box<[Expr; 2]>,
+    },
 }
 
 #[derive(Debug, Clone, PartialEq)]
@@ -353,6 +358,10 @@ impl Expr {
                 let mut children = members.exprs();
                 children.push(body);
                 children
+            }
+            ExprKind::Choice { condition, values } => {
+                let [first, second] = &**values;
+                vec![condition, first, second]
             }
         }
     }

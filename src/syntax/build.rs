@@ -426,6 +426,7 @@ impl Builder {
                 let function = self.name(inner.next());
                 ExprKind::Call { function, arguments: self.arguments(inner.next()) }
             }
+            Rule::choice => return self.choice(pair),
             _ => return self.fold(pair),
         };
         Expr { kind, span }
@@ -439,6 +440,15 @@ impl Builder {
             Argument { name, value: self.expr_or_zero(inner.next()) }
         };
         parts(pair).map(argument).collect()
+    }
+
+    /// `if condition then a else b`
+    fn choice(&self, pair: Node<'_>) -> Expr {
+        let span = self.span(&pair);
+        let mut inner = parts(pair).filter(|p| p.as_rule() == Rule::expr);
+        let condition = Box::new(self.expr_or_zero(inner.next()));
+        let values = Box::new([self.expr_or_zero(inner.next()), self.expr_or_zero(inner.next())]);
+        Expr { kind: ExprKind::Choice { condition, values }, span }
     }
 
     fn fold(&self, pair: Node<'_>) -> Expr {

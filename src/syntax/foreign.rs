@@ -1,7 +1,7 @@
 //! Words of OpenSCAD, POV-Ray, GLSL and Python, and what they are called here.
 
-/// What is written in place of a condition.
-pub const CONDITION: &str = "write `where(x <= 1, a, b)`: a where the condition holds, b elsewhere; shapes are joined by `and` and `or`";
+/// How a choice is written.
+pub const CONDITION: &str = "write `if x <= 1 then a else b`: a where the condition holds, b elsewhere; shapes are joined by `and` and `or`";
 
 /// What is written in place of a remainder.
 pub const REMAINDER: &str = "write `mod(a, b)`; shapes repeat by `shape.repeat([1, 0, 0], [6, 1, 1])`";

@@ -5,6 +5,7 @@ use pest::error::{Error, ErrorVariant, InputLocation};
 
 use super::ast::Ast;
 use super::build;
+use super::foreign;
 use super::grammar::{Grammar, Rule};
 use super::slips::Slip;
 use super::words::{ITEM_WORDS, KEYWORDS, token_at};
@@ -112,6 +113,14 @@ fn syntax_error(source: &Source, start: usize, end: usize, error: &Error<Rule>) 
         let message = format!("`{found}` is a word of the language and cannot be a name");
         return Diagnostic::error(Code::SYNTAX, span, message).help("choose another name");
     }
+    if let ErrorVariant::ParsingError { positives, .. } = &error.variant
+        && let Some(word) = missing_word(positives, found)
+    {
+        let what = if found.is_empty() { "end of the item".to_string() } else { format!("`{found}`") };
+        return Diagnostic::error(Code::SYNTAX, span, format!("unexpected {what}"))
+            .at(format!("expected `{word}`"))
+            .help(foreign::CONDITION);
+    }
     let slip = Slip { text: &source.text, start, at, found, span };
     if let Some(diagnostic) = slip.explained() {
         return diagnostic;
@@ -132,6 +141,21 @@ fn syntax_error(source: &Source, start: usize, end: usize, error: &Error<Rule>) 
     };
     let diagnostic = Diagnostic::error(Code::SYNTAX, span, format!("unexpected {what}"));
     if expected.is_empty() { diagnostic } else { diagnostic.at(format!("expected {expected}")) }
+}
+
+/// The word that an `if` lacks in front of what was found; `None` if that may be a slip within its condition or value.
+fn missing_word(expected: &[Rule], found: &str) -> Option<&'static str> {
+    let stops = matches!(found, "" | "{" | "}" | "[" | "]" | ")" | ":" | "," | ";" | "?");
+    if !stops && !found.starts_with(|c: char| c.is_alphanumeric()) {
+        return None;
+    }
+    if expected.contains(&Rule::kw_then) {
+        Some("then")
+    } else if expected.contains(&Rule::kw_else) {
+        Some("else")
+    } else {
+        None
+    }
 }
 
 /// Rule names in the words of the language, each only once.
@@ -157,6 +181,8 @@ fn expectation(rules: &[Rule]) -> String {
             Rule::close_brace => add("`}`"),
             Rule::kw_as => add("`as`"),
             Rule::kw_in if !may_end => add("`in`"),
+            Rule::kw_then => add("`then`"),
+            Rule::kw_else => add("`else`"),
             Rule::version => add("`rfm 1`"),
             Rule::edition => add("the edition of the language, as in `rfm 1`"),
             Rule::axis => add("`x`, `y`, `z`, or the name of a method or of something imported"),
@@ -268,10 +294,10 @@ impl Scan {
     }
 }
 
-/// Whether a word begins a fold at this place. Those that are functions as well do so in front of a name.
+/// Whether a word begins a fold or a choice at this place, which take everything to their right. Those that are functions as well do so in front of a name.
 fn begins_a_fold(word: &str, from: &str) -> bool {
     match word {
-        "any" | "all" => true,
+        "any" | "all" | "if" => true,
         "sum" | "product" | "min" | "max" => {
             let rest = from[word.len()..].trim_start();
             rest.starts_with(|c: char| c.is_alphabetic() || c == '_')

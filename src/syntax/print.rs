@@ -152,6 +152,12 @@ impl Printer {
                     p.expr(body);
                 });
             }
+            ExprKind::Choice { condition, values } => {
+                self.nested(format_args!("choice"), |p| {
+                    p.expr(condition);
+                    p.exprs(values.iter());
+                });
+            }
         }
     }
 

@@ -28,8 +28,13 @@ impl<'t> Slip<'t> {
         if let Some(diagnostic) = self.import() {
             return Some(diagnostic);
         }
-        if matches!(last_word(self.on_its_line().trim_end()), "if" | "when" | "case") {
-            return Some(self.syntax("a formula has no `if`").help(foreign::CONDITION));
+        if matches!(last_word(self.on_its_line().trim_end()), "when" | "case") {
+            return Some(self.syntax("a choice is written with `if`").help(foreign::CONDITION));
+        }
+        if self.found == ","
+            && unclosed(self.before()).is_some_and(|open| last_word(self.before()[..open].trim_end()) == "if")
+        {
+            return Some(self.unexpected().help(foreign::CONDITION));
         }
         if self.found.chars().next().is_some_and(|c| c.is_alphabetic() || c == '_') {
             return self.word();
@@ -270,6 +275,10 @@ impl<'t> Slip<'t> {
             true => format!("`{left} {sign} {right}`"),
             false => format!("`a {sign} b`"),
         };
+        if is_condition(before) {
+            let help = format!("write {} between numbers", compared("=="));
+            return Some(Diagnostic::error(Code::EQUALITY, self.span, "`=` does not compare").help(help));
+        }
         let (below, above) = (compared("<="), compared(">="));
         let help = format!("write {below} or {above}: each is the part of space on one side of a surface");
         Some(Diagnostic::error(Code::EQUALITY, self.span, "`=` does not compare").help(help))
@@ -413,6 +422,12 @@ fn number_ends(text: &str) -> bool {
 
 fn last_number(text: &str) -> &str {
     &text[text.trim_end_matches(|c: char| c.is_ascii_digit() || c == '.').len()..]
+}
+
+/// Whether a text ends within the condition of an `if`.
+fn is_condition(text: &str) -> bool {
+    let words = || text.split(|c: char| !c.is_alphanumeric() && c != '_').rev();
+    words().find(|word| ["if", "then"].contains(word)) == Some("if")
 }
 
 fn last_word(text: &str) -> &str {

@@ -3,8 +3,10 @@
 pub(super) const ITEM_WORDS: [&str; 6] = ["param", "let", "fn", "solid", "scene", "import"];
 
 /// The words that cannot be names.
-pub const KEYWORDS: [&str; 12] =
-    ["param", "let", "fn", "solid", "scene", "import", "and", "or", "not", "any", "all", "in"];
+pub const KEYWORDS: [&str; 15] = [
+    "param", "let", "fn", "solid", "scene", "import", "and", "or", "not", "any", "all", "in", "if", "then",
+    "else",
+];
 
 /// The word, number or single character at a place in the text.
 pub(super) fn token_at(text: &str, at: usize, end: usize) -> &str {

@@ -61,6 +61,9 @@ fn numbers_of_steps_and_functions() {
         ("step(1, 0.5) + 2*step(1, 1)", 2.0),
         ("where(3 >= 2, 1, 1/0)", 1.0),
         ("where(2 == 3 or 1 != 1, 1, 2)", 2.0),
+        ("if 2 == 3 then 1/0 else if not 1 != 1 then 2 else 3", 2.0),
+        ("if 1 > 0 then 4 else 5 + 6", 4.0),
+        ("(if 0 > 1 then 4 else 5) + 6", 11.0),
         ("sum i in 1..5: i^2", 30.0),
         ("product i in 1..6: i", 120.0),
         ("sum i in 3..3: i", 0.0),
@@ -80,6 +83,34 @@ fn numbers_of_steps_and_functions() {
     {
         assert!((value(expression, [0.7, 0.0, 0.0]) - expected).abs() < 1e-15, "{expression}");
     }
+}
+
+#[test]
+fn choices_are_written_in_two_ways() {
+    for (choice, call) in [
+        ("if x >= 0 then sphere(1) else box()", "where(x >= 0, sphere(1), box())"),
+        (
+            "box() and if x >= 0 and y <= 1 then z <= x or z <= y else z <= 0.5",
+            "box() and where(x >= 0 and y <= 1, z <= x or z <= y, z <= 0.5)",
+        ),
+        ("sphere(if 2 >= 1 then 0.5 else 2)", "sphere(where(2 >= 1, 0.5, 2))"),
+        ("sphere(1).move(if 1 > 2 then [1, 0, 0] else [0, 1, 0])", "sphere(1).move([0, 1, 0])"),
+    ] {
+        let [choice, call] = [choice, call].map(solid);
+        for point in [[0.3, -0.2, 0.1], [-0.7, 0.4, 0.9], [1.2, 0.1, -0.5]] {
+            let p = DVec3::from_array(point);
+            assert_eq!(choice.omega_grad(p), call.omega_grad(p));
+        }
+    }
+}
+
+#[test]
+fn names_in_what_is_left_out_are_used() {
+    let text = "rfm 1\nparam wide = 1\nlet r = 2\nlet unused = 3\nfn tall(shape) = shape\n\
+                solid s = if wide == 1 then sphere(1) else sphere(r).tall()\n";
+    let warnings = Program::from_source("t.rfm", text).unwrap().warnings();
+    let found: Vec<&str> = warnings.list.iter().map(|d| d.message.as_str()).collect();
+    assert_eq!(found, ["the name `unused` is never used"]);
 }
 
 #[test]

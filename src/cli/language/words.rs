@@ -34,7 +34,7 @@ pub(in crate::cli) const ITEMS: [(&str, &str); 6] = [
 ];
 
 /// Words and names that have a meaning of their own between functions.
-pub(in crate::cli) const SIGNS: [(&str, &str); 14] = [
+pub(in crate::cli) const SIGNS: [(&str, &str); 15] = [
     ("x", "the first coordinate of the point, in m"),
     ("y", "the second coordinate of the point, in m"),
     ("z", "the third coordinate of the point, in m; upwards"),
@@ -52,6 +52,7 @@ pub(in crate::cli) const SIGNS: [(&str, &str); 14] = [
     ("product", "a fold by `*`: `product k in 1..4: k`"),
     ("min", "a fold as well: `min p in list: length(p - [x, y, z])`, the smallest of all members"),
     ("max", "a fold as well: `max p in list: p.z`, the largest of all members"),
+    ("if", "a choice: `if closed == 1 then 1 cm else 2 cm`, between numbers, points or shapes"),
 ];
 
 /// Functions that are no text of the prelude: name, parameters, meaning.
@@ -78,7 +79,7 @@ const FUNCTIONS: &[(&str, &str, &str)] = &[
     ("fract", "e", "e − ⌊e⌋"),
     ("mod", "a, b", "a − b·⌊a/b⌋, which has the sign of b"),
     ("step", "edge, e", "1 where e ≥ edge, 0 elsewhere"),
-    ("where", "condition, a, b", "a where the condition holds, b elsewhere"),
+    ("where", "condition, a, b", "the same as `if condition then a else b`"),
     ("atan2", "y, x", "the angle of the point (x, y), in radians"),
     ("pow", "a, b", "a to the power of b"),
     ("min", "a, b, …", "the smallest"),

@@ -34,6 +34,10 @@ fn blanks_stand_where_they_belong() {
         "solid s=any i in 0 .. 6:ball( [i,0,0],r=-1 ) . move( [0,0,1] )\n",
         "solid s = any i in 0..6: ball([i, 0, 0], r = -1).move([0, 0, 1])\n",
     );
+    check(
+        "let a=if(x<=1)then-1 else if y>=2 then[1,2].x else not z<=1\n",
+        "let a = if (x <= 1) then -1 else if y >= 2 then [1, 2].x else not z <= 1\n",
+    );
     check("param p=1 in 0..2\"doc\"\n", "param p = 1 in 0 .. 2  \"doc\"\n");
     check("scene s{box{max:[1,1,1]},run{}}\n", "scene s { box { max: [1, 1, 1] }, run {} }\n");
 }

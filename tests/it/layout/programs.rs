@@ -146,7 +146,7 @@ impl Writer {
             return;
         }
         let depth = depth - 1;
-        match self.below(9) {
+        match self.below(10) {
             0 => {
                 self.put("(");
                 self.field(depth);
@@ -186,6 +186,13 @@ impl Writer {
                 self.put_one(&[".x", ".y", "[0]", "[ 1 ]"]);
             }
             5 => self.put("box ( min = [ -1 , 0 , 0 ] )"),
+            7 => {
+                self.put_one(&["( if x >= 0 then", "( if 2 == 1 then", "( if not y <= 1 and z <= 2 then"]);
+                self.field(depth.min(1));
+                self.put("else");
+                self.field(depth.min(1));
+                self.put(")");
+            }
             6 => self.put("min ( x , max ( y , z ) )"),
             _ => self.primary(0),
         }
