@@ -8,7 +8,7 @@ use smallvec::SmallVec;
 use super::super::{normals::unit, prune::Lattice};
 use super::edges::BrickEdges;
 use super::found::ThinCells;
-use crate::field::{Field, Sheet};
+use crate::field::{Field, Points, Sheet};
 use crate::geom::Aabb;
 use crate::interval::Interval;
 
@@ -65,6 +65,9 @@ const BACK: f64 = 0.5;
 /// The longest way in cells over which a thickness is measured, and its steps.
 const THICKEST: f64 = 2.0;
 const STEPS_ACROSS: usize = 64;
+
+/// Number of points that are evaluated together.
+const TOGETHER: usize = 16;
 
 /// How far beyond the cell, in cells, a point of the surface still counts as its own: a part that passes just
 /// between the nodes leaves next to nothing in the cell itself.
@@ -403,8 +406,8 @@ impl Look<'_> {
             return None;
         }
         let step = THICKEST * self.bounds.size().max_element() / STEPS_TO_END as f64;
-        let Some(mut far) = (1..=STEPS_TO_END).map(|i| step * i as f64).find(|t| !is_within(from + *t * way))
-        else {
+        let ends = |i: usize| step * (i + 1) as f64;
+        let Some(mut far) = self.first(STEPS_TO_END, |i| from + ends(i) * way, is_gap).map(ends) else {
             return Some(step * STEPS_TO_END as f64);
         };
         let mut near = far - step;
@@ -421,8 +424,10 @@ impl Look<'_> {
     fn across(&self, from: DVec3, way: DVec3, inside: bool) -> Across {
         let step = THICKEST * self.bounds.size().min_element() / STEPS_ACROSS as f64;
         let is_beyond = |t: f64| (self.omega(from + t * way) > 0.0) != inside;
-        let ends = (0..STEPS_ACROSS).map(|i| step * (i as f64 + 0.5));
-        let Some(mut far) = ends.into_iter().find(|t| is_beyond(*t)) else { return Across::FAR };
+        let ends = |i: usize| step * (i as f64 + 0.5);
+        let Some(mut far) = self.first(STEPS_ACROSS, |i| from + ends(i) * way, !inside).map(ends) else {
+            return Across::FAR;
+        };
         let mut near = f64::max(far - step, 0.0);
         for _ in 0..HALVED {
             let middle = 0.5 * (near + far);
@@ -434,6 +439,31 @@ impl Look<'_> {
             Some(normal) => Across { thickness: far, normal, way },
             None => Across::FAR,
         }
+    }
+
+    /// The first of some points that lies inside, or outside. They are evaluated in columns, a few at a time, because
+    /// the search often ends early.
+    fn first(&self, count: usize, point: impl Fn(usize) -> DVec3, inside: bool) -> Option<usize> {
+        let whole = self.lattice.whole();
+        let mut columns = [[0.0; TOGETHER]; 3];
+        let mut omega = [0.0; TOGETHER];
+        for start in (0..count).step_by(TOGETHER) {
+            let size = TOGETHER.min(count - start);
+            for k in 0..size {
+                let p = point(start + k);
+                for (column, coordinate) in columns.iter_mut().zip(p.to_array()) {
+                    column[k] = coordinate;
+                }
+            }
+            let [x, y, z] = columns.each_ref().map(|column| &column[..size]);
+            let points = Points::new(x, y, z);
+            self.field.omega_many(points, &mut omega[..size]);
+            let is_inside = |k: usize| omega[k] > 0.0 && whole.contains(points.get(k));
+            if let Some(found) = (0..size).find(|k| is_inside(*k) == inside) {
+                return Some(start + found);
+            }
+        }
+        None
     }
 
     /// The normals where the surface crosses the edges of this cell and of those around it.
