@@ -13,6 +13,29 @@ const MANY: i32 = 8;
 /// The room beyond the outermost marks of a logarithmic axis, as a factor.
 const MARGIN: f64 = 1.12;
 
+/// Positive values whose greatest is at least this many times their least are plotted by their logarithms.
+const WIDE: f64 = 100.0;
+
+/// An axis of a plot.
+pub(in crate::cli) trait Axis {
+    /// Where a value is, in the picture's units.
+    fn at(&self, value: f64) -> f64;
+
+    /// The values to mark, each with its text.
+    fn ticks(&self) -> Vec<(f64, String)>;
+}
+
+/// An axis over values: logarithmic if they are positive and span two powers of ten or more.
+pub(in crate::cli) fn fitting(values: &[f64], from: f64, to: f64) -> Box<dyn Axis> {
+    let finite = || values.iter().copied().filter(|value| value.is_finite());
+    let (least, most) = (finite().fold(f64::INFINITY, f64::min), finite().fold(0.0, f64::max));
+    if least > 0.0 && most >= WIDE * least {
+        Box::new(LogAxis::over(finite(), from, to))
+    } else {
+        Box::new(EvenAxis::over(finite(), from, to))
+    }
+}
+
 /// A logarithmic axis, from one number 1, 2 or 5 times a power of ten to another.
 pub(in crate::cli) struct LogAxis {
     /// Logarithms of the ends.
@@ -36,7 +59,9 @@ impl LogAxis {
         let high = steps().find(|step| *step >= most * MARGIN).unwrap_or(most);
         Self { low: low.log10(), high: high.log10(), from, to }
     }
+}
 
+impl Axis for LogAxis {
     /// The values to mark, each with its text: powers of ten, and if there are few of them also their double
     /// and fivefold.
     fn ticks(&self) -> Vec<(f64, String)> {
@@ -58,7 +83,7 @@ impl LogAxis {
             .collect()
     }
 
-    pub fn at(&self, value: f64) -> f64 {
+    fn at(&self, value: f64) -> f64 {
         let share = (value.log10() - self.low) / (self.high - self.low);
         self.from + share * (self.to - self.from)
     }
@@ -114,13 +139,14 @@ impl EvenAxis {
             }
         }
     }
+}
 
-    pub fn at(&self, value: f64) -> f64 {
+impl Axis for EvenAxis {
+    fn at(&self, value: f64) -> f64 {
         self.from + (value - self.low) / (self.high - self.low) * (self.to - self.from)
     }
 
-    /// The values to mark, each with its text.
-    fn ticks(&self) -> impl Iterator<Item = (f64, String)> {
+    fn ticks(&self) -> Vec<(f64, String)> {
         let count = ((self.high - self.low) / self.tick).round() as usize;
         let power = |value: f64| value.log10().floor();
         let digits = (-power(self.tick)).clamp(0.0, 12.0) as usize;
@@ -128,28 +154,18 @@ impl EvenAxis {
         let large = largest >= 1e6 || self.tick < 1e-6;
         // enough of them to distinguish one tick from the next
         let of_power = (power(largest) - power(self.tick)).clamp(1.0, 12.0) as usize;
-        (0..=count).map(move |k| {
+        let tick = |k: usize| {
             let value = self.low + k as f64 * self.tick;
             // the last bits of a sum must not give −0
             let value = if value.abs() < 1e-9 * self.tick { 0.0 } else { value };
             (value, if large { format!("{value:.of_power$e}") } else { format!("{value:.digits$}") })
-        })
+        };
+        (0..=count).map(tick).collect()
     }
-}
-
-/// Draws lines at the ticks, and the names of the axes.
-pub(in crate::cli) fn grid(out: &mut String, x: &LogAxis, y: &LogAxis, names: [&str; 2]) {
-    for (value, text) in x.ticks() {
-        across(out, x.at(value), &text);
-    }
-    for (value, text) in y.ticks() {
-        along(out, y.at(value), &text, WIDTH - RIGHT);
-    }
-    axis_names(out, names);
 }
 
 /// Draws lines at the ticks, and the names of the axes. The plot ends at x = `right`.
-pub(in crate::cli) fn even_grid(out: &mut String, x: &EvenAxis, y: &EvenAxis, names: [&str; 2], right: f64) {
+pub(in crate::cli) fn grid(out: &mut String, x: &dyn Axis, y: &dyn Axis, names: [&str; 2], right: f64) {
     for (value, text) in x.ticks() {
         across(out, x.at(value), &text);
     }
@@ -228,6 +244,16 @@ mod tests {
     }
 
     #[test]
+    fn positive_values_over_powers_of_ten_are_plotted_by_their_logarithms() {
+        let middle = |values: &[f64]| fitting(values, 0.0, 1.0).at(10.0);
+        // 1, 10 and 100 are equally far apart on a logarithmic axis alone
+        assert!((middle(&[1.0, 10.0, 100.0, f64::NAN]) - 0.5).abs() < 1e-9);
+        for even in [&[1.0, 10.0, 99.0][..], &[0.0, 10.0, 1000.0], &[-1.0, 10.0, 1000.0]] {
+            assert!(middle(even) < 0.2, "{even:?}");
+        }
+    }
+
+    #[test]
     fn zeros_of_two_axes_are_at_one_height_where_there_is_room() {
         let axes = |ranges: [[f64; 2]; 2]| {
             let mut axes = ranges.map(|range| EvenAxis::over(range.into_iter(), 100.0, 0.0));
@@ -260,16 +286,17 @@ mod tests {
             (0.0, 0.0),
         ] {
             let axis = EvenAxis::over([low, high].into_iter(), 0.0, 100.0);
-            let count = axis.ticks().count();
+            let count = axis.ticks().len();
             assert!((6..=15).contains(&count), "{low} {high}: {count}");
             assert!(axis.at(low) >= 0.0 && axis.at(high) <= 100.0 + 1e-9, "{low} {high}");
-            let texts: std::collections::BTreeSet<String> = axis.ticks().map(|(_, text)| text).collect();
+            let texts: std::collections::BTreeSet<String> =
+                axis.ticks().into_iter().map(|(_, text)| text).collect();
             assert!(low == high || texts.len() == count, "{texts:?}");
         }
         let empty = EvenAxis::over(std::iter::empty(), 0.0, 1.0);
         assert_eq!((empty.low, empty.high), (0.0, 1.0));
         let texts: Vec<String> =
-            EvenAxis::over([0.0, 0.3].into_iter(), 0.0, 1.0).ticks().map(|t| t.1).collect();
+            EvenAxis::over([0.0, 0.3].into_iter(), 0.0, 1.0).ticks().into_iter().map(|t| t.1).collect();
         assert_eq!(texts, ["0.00", "0.05", "0.10", "0.15", "0.20", "0.25", "0.30"]);
     }
 }

@@ -5,7 +5,7 @@ use std::fmt::Write;
 use std::path::Path;
 
 use super::super::Failure;
-use super::super::plot::{self, Labels, Legend, LogAxis};
+use super::super::plot::{self, Axis, Labels, Legend, LogAxis};
 use super::flow_run::FlowRun;
 use rfm::experiment::Deviation;
 use rfm::sph::Method;
@@ -45,7 +45,13 @@ pub(super) fn draw(scene: &str, rows: &[FlowRun], path: &Path) -> Result<Vec<u8>
     let x =
         LogAxis::over(marks.iter().map(|(row, ..)| row.cpu_seconds), plot::LEFT, plot::WIDTH - plot::RIGHT);
     let y = LogAxis::over(marks.iter().map(|(.., error)| *error), plot::HEIGHT - plot::BOTTOM, plot::TOP);
-    plot::grid(&mut out, &x, &y, ["processor time, s", "relative deviation (no unit)"]);
+    plot::grid(
+        &mut out,
+        &x,
+        &y,
+        ["processor time, s", "relative deviation (no unit)"],
+        plot::WIDTH - plot::RIGHT,
+    );
     let mut lines = Vec::new();
     for (method, colour) in Method::all().iter().map(Method::name).zip(COLOURS.into_iter().cycle()) {
         for (&k, dashes) in known.iter().zip(DASHES) {

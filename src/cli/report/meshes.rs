@@ -10,7 +10,7 @@ use serde::Serialize;
 use super::super::args::MeshMethod;
 use super::super::failure::{Failure, note};
 use super::super::mesh::no_grid;
-use super::super::plot::{self, Labels, Legend, LogAxis};
+use super::super::plot::{self, Axis, Labels, Legend, LogAxis};
 use super::super::progress;
 use super::table::{self, Column};
 use rfm::Solid;
@@ -184,7 +184,13 @@ pub(super) fn draw(solid: &str, rows: &[MeshFigures], path: &Path) -> Result<Vec
     let x =
         LogAxis::over(marks.iter().map(|(row, _)| row.cells as f64), plot::LEFT, plot::WIDTH - plot::RIGHT);
     let y = LogAxis::over(marks.iter().map(|(_, error)| *error), plot::HEIGHT - plot::BOTTOM, plot::TOP);
-    plot::grid(&mut out, &x, &y, ["cells along the longest side", "Hausdorff distance, m"]);
+    plot::grid(
+        &mut out,
+        &x,
+        &y,
+        ["cells along the longest side", "Hausdorff distance, m"],
+        plot::WIDTH - plot::RIGHT,
+    );
     let methods = [("mc", "marching cubes", "#1b6ca8"), ("dc", "dual contouring", "#c05621")];
     let own = |method: &str| {
         let rows = marks.iter().filter(|(row, _)| row.method == method);

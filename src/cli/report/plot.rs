@@ -5,7 +5,7 @@ use std::path::Path;
 
 use super::super::failure::Failure;
 use super::super::plot::{
-    BOTTOM, HEIGHT, LEFT, Legend, LogAxis, RIGHT, TOP, WIDTH, begin, end, grid, sentence,
+    Axis, BOTTOM, HEIGHT, LEFT, Legend, LogAxis, RIGHT, TOP, WIDTH, begin, end, grid, sentence,
 };
 use super::programs::ProgramFigures;
 
@@ -50,7 +50,13 @@ fn svg(solid: &str, rows: &[ProgramFigures]) -> String {
     }
     let x = LogAxis::over(marks.iter().map(|mark| mark.row.ns_per_point), LEFT, WIDTH - RIGHT);
     let y = LogAxis::over(marks.iter().map(|mark| mark.error), HEIGHT - BOTTOM, TOP);
-    grid(&mut out, &x, &y, ["time per point on one thread, ns", "largest relative error (no unit)"]);
+    grid(
+        &mut out,
+        &x,
+        &y,
+        ["time per point on one thread, ns", "largest relative error (no unit)"],
+        WIDTH - RIGHT,
+    );
     for mark in &marks {
         mark.draw(&mut out, x.at(mark.row.ns_per_point), y.at(mark.error));
     }

@@ -3,7 +3,7 @@
 use std::fmt::Write as _;
 
 use super::super::output::significant;
-use super::super::plot::{self, EvenAxis, HEIGHT, LEFT, Legend, RIGHT, SECOND_AXIS, TOP, WIDTH};
+use super::super::plot::{self, Axis, EvenAxis, HEIGHT, LEFT, Legend, RIGHT, SECOND_AXIS, TOP, WIDTH};
 use super::means::Means;
 use rfm::sph::Probe;
 
@@ -65,7 +65,7 @@ pub(super) fn drawn(name: &str, probe: &Probe, table: &str, means: Option<&Means
         })
         .collect();
     EvenAxis::with_common_zero(&mut axes);
-    plot::even_grid(&mut out, &x, &axes[0], ["time, s", &axis_name(&series, units[0])], right);
+    plot::grid(&mut out, &x, &axes[0], ["time, s", &axis_name(&series, units[0])], right);
     if let Some(second) = axes.get(1) {
         plot::right_axis(&mut out, second, &axis_name(&series, units[1]), right);
     }

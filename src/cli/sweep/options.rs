@@ -10,8 +10,9 @@ use super::values::{Sweep, sweep};
 #[derive(Debug, Clone, Default, Args)]
 #[command(next_help_heading = "Sweeps")]
 pub(in crate::cli) struct SweepOptions {
-    /// Repeat the command for N values of a param from A to B, both included, in folders of their own, with index.json,
-    /// a table and a plot beside them; several make a grid. The unit stands behind B: --sweep alpha="0..30 deg:4"
+    /// Repeat the command for N values of a param from A to B, both included, or for those of a list, NAME=A,B,…, in
+    /// folders of their own, with index.json, a table and a plot beside them; several make a grid. The unit stands
+    /// behind the last number: --sweep alpha="0..30 deg:4"
     #[arg(long, value_name = "NAME=A..B:N", value_parser = sweep)]
     pub sweep: Vec<Sweep>,
     /// The folder of a sweep [default: the file's name + .sweep]

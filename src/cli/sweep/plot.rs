@@ -3,7 +3,7 @@
 
 use std::fmt::Write;
 
-use super::super::plot::{self, EvenAxis, Legend};
+use super::super::plot::{self, Legend};
 use super::figures::is_said_elsewhere;
 use super::index::{Index, Row};
 use rfm::slice;
@@ -65,14 +65,15 @@ fn panel(index: &Index, name: &str) -> String {
     let lines = lines(index, name);
     let right = plot::WIDTH - plot::RIGHT;
     let points = || lines.iter().flat_map(|line| &line.points);
-    let x = EvenAxis::over(points().map(|point| point[0]), plot::LEFT, right);
-    let ends = points().flat_map(|[_, value, error]| [value - error, value + error]);
-    let y = EvenAxis::over(ends, plot::HEIGHT - plot::BOTTOM, plot::TOP);
+    let places: Vec<f64> = points().map(|point| point[0]).collect();
+    let x = plot::fitting(&places, plot::LEFT, right);
+    let ends: Vec<f64> = points().flat_map(|[_, value, error]| [value - error, value + error]).collect();
+    let y = plot::fitting(&ends, plot::HEIGHT - plot::BOTTOM, plot::TOP);
     let unit = index.figures(name).map(|figure| figure.unit.as_str()).find(|unit| !unit.is_empty());
     let mut out = plot::begin(&unit.map_or_else(|| name.into(), |unit| format!("{name}, {unit}")));
     let along = index.sweeps.first().map_or_else(String::new, |axis| slice::escaped(&axis.column()));
     // the title names what goes up
-    plot::even_grid(&mut out, &x, &y, [&along, ""], right);
+    plot::grid(&mut out, &*x, &*y, [&along, ""], right);
     let mut legend = Legend::new();
     for (i, (line, colour)) in lines.iter().zip(COLOURS.into_iter().cycle()).enumerate() {
         let path: Vec<String> = line

@@ -1,4 +1,4 @@
-//! `--sweep NAME=A..B:N`: the values that a param goes through.
+//! `--sweep NAME=A..B:N` and `--sweep NAME=A,B,…`: the values that a param goes through.
 
 use super::super::values::{Definition, definition};
 use rfm::quantity::{number_and_unit, parse_quantity, parse_unit};
@@ -9,7 +9,7 @@ pub(in crate::cli) struct Sweep {
     pub name: String,
     /// The unit of the values, as it was written; empty without one.
     pub unit: String,
-    /// The values in that unit, in ascending order, evenly spaced.
+    /// The values in that unit, in ascending order.
     pub values: Vec<f64>,
 }
 
@@ -19,10 +19,14 @@ const MOST_VALUES: usize = 10_000;
 /// Digits of values: what is lost to rounding does not show.
 const DIGITS: usize = 12;
 
-/// Reads `NAME=A..B:N`, with a unit behind B or behind both.
+/// Reads `NAME=A..B:N` or `NAME=A,B,…`, with a unit behind the last number or behind all.
 pub(in crate::cli) fn sweep(text: &str) -> Result<Sweep, String> {
-    let form = "expected NAME=A..B:N, as in side=1..2:5 or alpha=\"0..30 deg:4\"";
+    let form =
+        "expected NAME=A..B:N or NAME=A,B,…, as in side=1..2:5, alpha=\"0..30 deg:4\" or side=1,10,100";
     let (name, range) = text.split_once('=').ok_or(form)?;
+    if range.contains(',') && !range.contains("..") {
+        return listed(name.trim(), range);
+    }
     let (ends, count) =
         range.rsplit_once(':').ok_or_else(|| format!("the number of values is missing; {form}"))?;
     let (low, high) = ends.split_once("..").ok_or(form)?;
@@ -52,7 +56,22 @@ pub(in crate::cli) fn sweep(text: &str) -> Result<Sweep, String> {
     }
 }
 
-/// An end of the range, in the unit of its upper one.
+/// The values of a list, in the unit behind the last one.
+fn listed(name: &str, list: &str) -> Result<Sweep, String> {
+    let texts: Vec<&str> = list.split(',').collect();
+    if texts.len() > MOST_VALUES {
+        return Err(format!("{} values: at most {MOST_VALUES} are possible", texts.len()));
+    }
+    let (_, unit) = number_and_unit(texts.last().map_or("", |text| text.trim()));
+    let mut values = texts.iter().map(|text| end_in(text, unit)).collect::<Result<Vec<f64>, String>>()?;
+    values.sort_unstable_by(f64::total_cmp);
+    if let Some(pair) = values.windows(2).find(|pair| pair[0] == pair[1]) {
+        return Err(format!("{} is listed twice", written(pair[0])));
+    }
+    Ok(Sweep { name: name.to_string(), unit: unit.to_string(), values })
+}
+
+/// An end of the range, or a value of the list, in the unit of its last one.
 fn end_in(text: &str, unit: &str) -> Result<f64, String> {
     let (value, dimension) = parse_quantity(text)?;
     if !value.is_finite() {
@@ -64,7 +83,7 @@ fn end_in(text: &str, unit: &str) -> Result<f64, String> {
     }
     let Some(wanted) = parse_unit(unit) else {
         return Err(format!(
-            "`{}` has a unit, and the other end has none: write it behind the upper end",
+            "`{}` has a unit, and the last number has none: write it behind that",
             text.trim()
         ));
     };
@@ -143,6 +162,8 @@ mod tests {
         check("a=0..0.3:4", "", &[0.0, 0.1, 0.2, 0.3]);
         check("a=5mm..2cm:4", "cm", &[0.5, 1.0, 1.5, 2.0]);
         check("a = 1e-3 .. 3e-3 m/s : 3", "m/s", &[1e-3, 2e-3, 3e-3]);
+        check("a=100,1,10", "", &[1.0, 10.0, 100.0]);
+        check("a=5mm, 1, 3 cm", "cm", &[0.5, 1.0, 3.0]);
         let degrees = sweep("a=0..30 deg:4").unwrap().definition(30.0).unwrap();
         assert_eq!((degrees.name.as_str(), degrees.value), ("a", 30.0 * (std::f64::consts::PI / 180.0)));
     }
@@ -162,7 +183,11 @@ mod tests {
             ("a=1..inf:3", "not finite"),
             ("a=-1e308..1e308:3", "is too far"),
             ("a=1..1.0000000000001:4", "do not differ in 12 digits"),
-            ("a=1mm..2:3", "write it behind the upper end"),
+            ("a=1mm..2:3", "write it behind that"),
+            ("a=1,2,1", "1 is listed twice"),
+            ("a=1,,2", "is not a number"),
+            ("a=1 mm,2", "write it behind that"),
+            ("a=1 s,2 mm", "do not measure the same"),
             ("a=1s..2mm:3", "do not measure the same"),
             ("a=1..2 furlong:3", "is not a unit"),
         ] {
