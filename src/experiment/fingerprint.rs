@@ -33,4 +33,18 @@ impl Experiment {
         );
         blake3::hash(text.as_bytes()).into()
     }
+
+    /// A number that says whether deviations belong to the scene's `truth`: its formulas and the time from which they
+    /// hold. Zero without a truth. Checkpoints keep it as a floating-point number, so it has 32 bits.
+    pub fn truth_mark(&self) -> u32 {
+        let Some(truth) = self.scene.truth else { return 0 };
+        let velocity = truth.velocity.into_iter().flatten().map(|node| ("velocity", node));
+        let pressure = truth.pressure.into_iter().map(|node| ("pressure", node));
+        let front = truth.front.into_iter().map(|node| ("front", node));
+        let roots: Vec<_> = velocity.chain(pressure).chain(front).collect();
+        let text = format!("{}\n{:?}", ir::dump(&self.program.module().graph, &roots, &[]), truth.from);
+        let hash = blake3::hash(text.as_bytes());
+        let [a, b, c, d, ..] = *hash.as_bytes();
+        u32::from_le_bytes([a, b, c, d]).max(1)
+    }
 }

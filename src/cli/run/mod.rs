@@ -72,6 +72,7 @@ pub(super) fn run(shared: &Shared, options: &Run) -> Result<(), Failure> {
     let goal = Goal::of(options, &experiment)?;
     goal.lies_ahead(options, &folder, Begin { steps: simulation.steps(), time: simulation.time() })?;
     frames_fit(options, goal, &experiment)?;
+    let watch = Watch::new(&experiment, &simulation, carved, resumed.as_ref())?;
     let _held = held.map_or_else(|| Hold::take(&folder), Ok)?;
     // another run may have ended in the meantime
     folder::may_be_written(&folder, options, experiment.scene())?;
@@ -79,7 +80,7 @@ pub(super) fn run(shared: &Shared, options: &Run) -> Result<(), Failure> {
         frames: Frames::new(options, &experiment, resumed.as_ref())?,
         probes: Probes::start(&folder, experiment.scene(), &mut simulation, resumed.as_ref())?,
         checkpoints: Checkpoints::new(&folder, fingerprint, experiment.scene(), resumed.as_ref()),
-        watch: Watch::new(&simulation, carved, resumed.as_ref()),
+        watch,
         experiment: &experiment,
     };
     let pace = Pace::new(&experiment, simulation.time());

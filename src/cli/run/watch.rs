@@ -3,12 +3,16 @@
 
 use std::time::Duration;
 
+use super::super::failure::Failure;
 use rfm::Experiment;
 use rfm::experiment::Deviations;
 use rfm::sph::{Checkpoint, Simulation, Stats};
 
 /// Name of the memory of [`Watch`] in a checkpoint.
 pub(super) const WATCH: &str = "watch";
+
+/// Number of figures in that memory, before the mark of the truth.
+const FIGURES: usize = 17;
 
 /// The figures of a run while it is running.
 pub(super) struct Watch {
@@ -24,10 +28,20 @@ pub(super) struct Watch {
     pub neighbours: (f64, usize),
     /// Deviations from the known solution of the flow.
     pub deviations: Deviations,
+    /// [`Experiment::truth_mark`] of that solution.
+    truth: u32,
 }
 
 impl Watch {
-    pub fn new(simulation: &Simulation, carved: usize, resumed: Option<&Checkpoint>) -> Self {
+    /// # Errors
+    /// The run goes on with another `truth`, of which instants have passed: what was compared with the old one says
+    /// nothing of the new one.
+    pub fn new(
+        experiment: &Experiment,
+        simulation: &Simulation,
+        carved: usize,
+        resumed: Option<&Checkpoint>,
+    ) -> Result<Self, Failure> {
         let stats = simulation.stats();
         let energy = stats.kinetic_energy + stats.potential_energy;
         let mut watch = Self {
@@ -36,18 +50,27 @@ impl Watch {
             energy_at_start: energy,
             neighbours: (stats.neighbours_per_particle, 1),
             deviations: Deviations::default(),
+            truth: experiment.truth_mark(),
             now: stats.clone(),
             worst: stats,
         };
         if let Some(memory) = resumed.and_then(|checkpoint| checkpoint.get(WATCH).ok()) {
             watch.take_up(memory);
+            let now = experiment.truth_mark();
+            if watch.truth != now {
+                let truth = experiment.scene().truth;
+                if let Some(truth) = truth.filter(|truth| truth.from <= simulation.time()) {
+                    return Err(changed(watch.truth, truth.from, simulation.time()));
+                }
+                (watch.truth, watch.deviations) = (now, Deviations::default());
+            }
         }
-        watch
+        Ok(watch)
     }
 
     /// The figures as numbers, for a checkpoint.
     pub fn memory(&self) -> Vec<f64> {
-        let Self { spent, carved, energy_at_start, neighbours, worst, .. } = self;
+        let Self { spent, carved, energy_at_start, neighbours, worst, truth, .. } = self;
         let mut memory = vec![
             spent.as_secs_f64(),
             *carved as f64,
@@ -61,16 +84,23 @@ impl Watch {
             worst.max_density_error,
         ];
         memory.extend(self.deviations.memory());
+        memory.push(f64::from(*truth));
         memory
     }
 
     /// Restores the figures from a memory. A memory of another length is ignored.
     fn take_up(&mut self, memory: &[f64]) {
+        // earlier versions did not note the truth
+        let (memory, truth) = match memory {
+            [memory @ .., truth] if memory.len() == FIGURES => (memory, Some(*truth as u32)),
+            memory => (memory, None),
+        };
         let Ok([spent, carved, start, sum, looks, depth, inside, lost, non_finite, density, deviations @ ..]) =
-            <[f64; 17]>::try_from(memory)
+            <[f64; FIGURES]>::try_from(memory)
         else {
             return;
         };
+        self.truth = truth.unwrap_or(self.truth);
         self.spent = Duration::try_from_secs_f64(spent).unwrap_or_default();
         self.carved = carved as usize;
         self.energy_at_start = start;
@@ -100,4 +130,13 @@ impl Watch {
         worst.max_density_error = worst.max_density_error.max(now.max_density_error);
         self.now = now;
     }
+}
+
+/// Why a run cannot go on that is at a time `at`, s, and whose `truth` is another one from a time on.
+fn changed(was: u32, from: f64, at: f64) -> Failure {
+    let what = if was == 0 { "`truth` is new" } else { "`truth` has changed" };
+    Failure::usage(format!(
+        "cannot go on: {what}, and holds already (from t = {from} s, and the run is at t = {at} s). Let it begin later \
+         (`from:`), or begin the run anew with --force"
+    ))
 }
