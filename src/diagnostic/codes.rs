@@ -180,7 +180,8 @@ UNUSED = "W0401":
 it silently. A fold whose variable is not used has many equal members.";
 EMPTY_SOLID = "W0402":
 "Interval arithmetic proves that ω is nowhere positive: the solid is empty, its mesh has no triangles and nothing
-ever collides with it.";
+ever collides with it. If the message says that the solid *may be* empty, that is not proven: `check` found no part of it, neither
+on its grid nor between the nodes.";
 UNBOUNDED_SOLID = "W0403":
 "The solid could not be proven to end towards the sides that the message names: it cannot be meshed over its own
 bounds. If one member of a union is to blame, the message marks it. Intersect it with a box, or mesh it over a scene's
@@ -242,17 +243,17 @@ gradient, and lengths in place of their powers have gradients near 1: `r - sqrt(
     rfm 1
     solid peg = normalise(1e4*(0.01 - x² - y²)) and 0 <= z <= 1";
 JUMP = "W0417":
-"At the surface ω jumps from one sign to the other instead of passing through zero: the border of a `where`, a step of
+"At the surface ω jumps from one sign to the other instead of passing through zero: the border of an `if`, a step of
 `floor`, `mod` or `round`, or a pole of a divisor lies there. No distance, normal or smooth mesh follows from such a surface,
 and particles may pass it. Let both values agree where they meet, move the border away from the surface, or cut the shape by
 `and` at the border.
 
     rfm 1
-    solid step = box([-1, -1, 0], [1, 1, 2]) and where(x <= 0, 1 - z, 0.5 - z)";
+    solid step = box([-1, -1, 0], [1, 1, 2]) and (if x <= 0 then 1 - z else 0.5 - z)";
 SINGULAR = "W0418":
 "Outside of the solid, in the scene that has it as an obstacle or close to it, ω has no value: a divisor is zero there, or a
 root or a logarithm is taken of a negative number. What comes near is neither inside nor outside, and a run stops there. Keep
-the formula away from that place by `max`, or choose another one by `where`: `where(x > 0, ln(max(x, 1e-9)), -20)`.";
+the formula away from that place by `max`, or choose another one: `if x > 0 then ln(max(x, 1e-9)) else -20`.";
 NO_EDGE = "W0419":
 "`.round(radius)` makes arcs of the edges at which the parts of a shape are joined by `and`, `or` and `\\`. This shape is one
 formula, or its parts are joined further inside: `min`, `max` and `blend` keep their edges, and `.taper` makes one formula of what it

@@ -432,5 +432,5 @@ fn a_volume_that_is_no_number_is_not_called_thin() {
     assert!(!said.contains("thin"), "{said}");
     let sheet = b"rfm 1\nsolid s = box([0, 0, 0], [1, 1, 1]) and abs(x + y + z - 1.234) <= 1e-5\n";
     let said = rfm_reading(root(), &["check", "-"], sheet).expect(0).stdout;
-    assert!(said.contains("volume      not found: too thin for 96 cells"), "{said}");
+    assert!(said.contains("volume      not found: it is empty, or too thin for 96 cells"), "{said}");
 }

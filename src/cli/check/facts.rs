@@ -50,6 +50,9 @@ pub(super) struct Facts {
     /// Why there is no volume although there are bounds.
     #[serde(skip)]
     pub no_volume: Option<String>,
+    /// Whether nothing of the solid was found: the finer grid has no surface, and no part hides between its nodes.
+    #[serde(skip)]
+    pub shows_nothing: bool,
 }
 
 impl Facts {
@@ -73,6 +76,7 @@ impl Facts {
             unfinished: Vec::new(),
             components_coarser: None,
             no_volume: None,
+            shows_nothing: false,
         }
     }
 }

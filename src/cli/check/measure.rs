@@ -49,6 +49,7 @@ pub(super) fn measure(solid: &Solid, file: &str, deadline: &Deadline) -> Result<
             return Ok((facts, ThinCells::NONE));
         }
     };
+    let mut shows_nothing = false;
     match mesh::volume(&*surface, bounds, VOLUME_CELLS, deadline) {
         Ok(found) => {
             facts.volume = Some(found.volume);
@@ -59,7 +60,9 @@ pub(super) fn measure(solid: &Solid, file: &str, deadline: &Deadline) -> Result<
             facts.components_coarser = Some(found.solids_coarser);
         }
         Err(VolumeError::TooThin) => {
-            facts.no_volume = Some(format!("too thin for {VOLUME_CELLS} cells along its longest side"));
+            facts.no_volume =
+                Some(format!("it is empty, or too thin for {VOLUME_CELLS} cells along its longest side"));
+            shows_nothing = true;
         }
         Err(error @ VolumeError::TooFewCells(_)) => return Err(Failure::usage(error)),
         Err(VolumeError::Grid(error)) => return Err(Failure::usage(error)),
@@ -89,6 +92,8 @@ pub(super) fn measure(solid: &Solid, file: &str, deadline: &Deadline) -> Result<
         let is_known = solids != coarser || !no_thin_parts || thin.is_some_and(|thin| !thin.ended);
         facts.resolved = is_known.then_some(solids == coarser && no_thin_parts);
     }
+    // a part thinner than a cell would have been found
+    facts.shows_nothing = shows_nothing && thin.is_some_and(|thin| thin.count == 0 && !thin.ended);
     facts.thin_cells = thin.filter(|thin| !thin.ended).map(|thin| thin.count);
     Ok((facts, thin.unwrap_or(ThinCells::NONE)))
 }

@@ -228,6 +228,9 @@ fn solids(
             None => {}
         }
         diagnostics.list.extend(remarks(program, named, &solid, &thin));
+        if found.shows_nothing {
+            diagnostics.list.push(may_be_empty(named));
+        }
         diagnostics.list.extend(lints::of_solid(program, named, &solid, &mut searches));
         facts.push(found);
     }
@@ -252,6 +255,16 @@ fn too_long(solid: &Solid, operations: usize, budget: f64) -> Option<String> {
     let seconds = (each * operations as f64).ceil();
     let why = || format!("measuring it may take {seconds} s; --budget {seconds} allows it");
     (seconds > budget).then(why)
+}
+
+/// A warning about a solid that has a box but shows nothing in it, as `sphere(1) and not sphere(1)`.
+fn may_be_empty(named: &NamedSolid) -> Diagnostic {
+    let message = format!(
+        "solid `{}` may be empty: {VOLUME_CELLS} cells along its longest side show nothing of it, and no part is hidden between them",
+        named.name
+    );
+    Diagnostic::warning(Code::EMPTY_SOLID, named.span, message)
+        .help("look for a shape that is joined by `and` to its own outside, or for a thickness of zero")
 }
 
 /// Warnings about a solid that is empty, unbounded or thin.
