@@ -1,4 +1,5 @@
-//! Files of params, as `-P` names them: TOML or JSON, one value for each param.
+//! Files of params, as `-P` names them: TOML or JSON, one value for each param, those of imported files in tables of
+//! their own.
 
 use std::path::{Path, PathBuf};
 
@@ -15,7 +16,16 @@ pub(super) fn read(paths: &[PathBuf]) -> Result<Vec<Definition>, Failure> {
     for path in paths {
         let text = input::read(path)?.text;
         for (name, value) in table(path, &text)? {
-            found.push(one(&place(path, &text, &name), &name, &value)?);
+            match value {
+                // those of an imported file: `[lib]` and `n = 7` set `lib.n`
+                Value::Object(members) => {
+                    for (member, value) in members {
+                        let qualified = format!("{name}.{member}");
+                        found.push(one(&place(path, &text, &member), &qualified, &value)?);
+                    }
+                }
+                value => found.push(one(&place(path, &text, &name), &name, &value)?),
+            }
         }
     }
     Ok(found)
@@ -62,7 +72,17 @@ fn one(place: &str, name: &str, value: &Value) -> Result<Definition, Failure> {
     let text = match value {
         Value::Number(number) => number.to_string(),
         Value::String(text) => text.clone(),
-        Value::Null | Value::Bool(_) | Value::Array(_) | Value::Object(_) => {
+        Value::Bool(is_so) => {
+            let number = u8::from(*is_so);
+            return Err(Failure::usage(format!("{place}: `{name}` is no number: write `{name} = {number}`")));
+        }
+        Value::Object(_) => {
+            let message = format!(
+                "{place}: `{name}` is a table: tables hold the params of imported files, as in `[lib]`"
+            );
+            return Err(Failure::usage(message));
+        }
+        Value::Null | Value::Array(_) => {
             let message =
                 format!("{place}: `{name}` is no number: write `{name} = 0.5` or `{name} = \"8 mm\"`");
             return Err(Failure::usage(message));
@@ -89,5 +109,21 @@ mod tests {
             assert_eq!(place(path, json, name), format!("sizes.toml:{expected}"), "{name}");
         }
         assert_eq!(place(path, "[a]\nb = 1", "a"), "sizes.toml");
+    }
+
+    #[test]
+    fn tables_hold_the_params_of_imported_files() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("p.toml");
+        std::fs::write(&path, "k = 1\n[lib]\nn = 7\nh = \"8 mm\"\n").unwrap();
+        let read = |path: &Path| read(&[path.to_path_buf()]);
+        let found = read(&path).unwrap();
+        let values: Vec<(&str, f64)> = found.iter().map(|one| (one.name.as_str(), one.value)).collect();
+        assert_eq!(values.len(), 3);
+        for expected in [("k", 1.0), ("lib.n", 7.0), ("lib.h", 0.008)] {
+            assert!(values.contains(&expected), "{values:?}");
+        }
+        std::fs::write(&path, "open = true\n").unwrap();
+        assert!(format!("{:?}", read(&path).unwrap_err()).contains("write `open = 1`"));
     }
 }
