@@ -13,27 +13,56 @@ const MANY: i32 = 8;
 /// The room beyond the outermost marks of a logarithmic axis, as a factor.
 const MARGIN: f64 = 1.12;
 
-/// Positive values whose greatest is at least this many times their least are plotted by their logarithms.
+/// Positive values whose greatest is at least this many times their least are plotted by their logarithms: on an even
+/// axis the smaller ones would lie in the line of the axis itself.
 const WIDE: f64 = 100.0;
 
 /// An axis of a plot.
 pub(in crate::cli) trait Axis {
-    /// Where a value is, in the picture's units.
+    /// Where a value is, in the picture's units. On a logarithmic axis it must be positive.
     fn at(&self, value: f64) -> f64;
 
     /// The values to mark, each with its text.
     fn ticks(&self) -> Vec<(f64, String)>;
 }
 
-/// An axis over values: logarithmic if they are positive and span two powers of ten or more.
-pub(in crate::cli) fn fitting(values: &[f64], from: f64, to: f64) -> Box<dyn Axis> {
-    let finite = || values.iter().copied().filter(|value| value.is_finite());
-    let (least, most) = (finite().fold(f64::INFINITY, f64::min), finite().fold(0.0, f64::max));
-    if least > 0.0 && most >= WIDE * least {
-        Box::new(LogAxis::over(finite(), from, to))
+/// An axis over figures and what else must find room, as the ends of their errors: logarithmic if the figures span two
+/// powers of ten or more, and all is positive.
+pub(in crate::cli) fn over_figures(figures: &[f64], room: &[f64], from: f64, to: f64) -> Box<dyn Axis> {
+    let all = || figures.iter().chain(room).copied().filter(|value| value.is_finite());
+    if all().all(|value| value > 0.0) && span(figures) >= WIDE {
+        Box::new(LogAxis::over(all(), from, to))
     } else {
-        Box::new(EvenAxis::over(finite(), from, to))
+        Box::new(EvenAxis::over(all(), from, to))
     }
+}
+
+/// An axis over the values of a param: logarithmic if they span two powers of ten or more, and if their ratios are more
+/// even than their differences.
+pub(in crate::cli) fn over_params(values: &[f64], from: f64, to: f64) -> Box<dyn Axis> {
+    let mut sorted = values.to_vec();
+    sorted.sort_unstable_by(f64::total_cmp);
+    sorted.dedup();
+    let uneven = |gap: &dyn Fn(f64, f64) -> f64| {
+        let gaps: Vec<f64> = sorted.windows(2).map(|pair| gap(pair[0], pair[1])).collect();
+        span(&gaps)
+    };
+    if sorted.first().is_some_and(|least| *least > 0.0)
+        && span(&sorted) >= WIDE
+        && uneven(&|a, b| (b / a).ln()) < uneven(&|a, b| b - a)
+    {
+        Box::new(LogAxis::over(sorted.into_iter(), from, to))
+    } else {
+        Box::new(EvenAxis::over(sorted.into_iter(), from, to))
+    }
+}
+
+/// The greatest of some positive values over the least; 1 without values.
+fn span(values: &[f64]) -> f64 {
+    let ends = |(least, most): (f64, f64), value: &f64| (least.min(*value), most.max(*value));
+    let finite = values.iter().filter(|value| value.is_finite());
+    let (least, most) = finite.fold((f64::INFINITY, 0.0), ends);
+    if most > 0.0 { most / least } else { 1.0 }
 }
 
 /// A logarithmic axis, from one number 1, 2 or 5 times a power of ten to another.
@@ -244,13 +273,22 @@ mod tests {
     }
 
     #[test]
-    fn positive_values_over_powers_of_ten_are_plotted_by_their_logarithms() {
-        let middle = |values: &[f64]| fitting(values, 0.0, 1.0).at(10.0);
+    fn values_over_powers_of_ten_are_plotted_by_their_logarithms() {
+        let middle = |values: &[f64], room: &[f64]| over_figures(values, room, 0.0, 1.0).at(10.0);
         // 1, 10 and 100 are equally far apart on a logarithmic axis alone
-        assert!((middle(&[1.0, 10.0, 100.0, f64::NAN]) - 0.5).abs() < 1e-9);
+        assert!((middle(&[1.0, 10.0, 100.0, f64::NAN], &[]) - 0.5).abs() < 0.05);
         for even in [&[1.0, 10.0, 99.0][..], &[0.0, 10.0, 1000.0], &[-1.0, 10.0, 1000.0]] {
-            assert!(middle(even) < 0.2, "{even:?}");
+            assert!(middle(even, &[]) < 0.2, "{even:?}");
         }
+        // an error as large as its figure is no power of ten, and one below zero has no logarithm
+        assert!((over_figures(&[1.0], &[0.01, 1.99], 0.0, 1.0).at(1.0) - 0.5).abs() < 0.05);
+        assert!(middle(&[1.0, 10.0, 1000.0], &[-1.0]) < 0.2);
+
+        let param = |values: &[f64]| over_params(values, 0.0, 1.0).at(10.0);
+        assert!((param(&[1.0, 10.0, 100.0]) - 0.5).abs() < 0.05);
+        let evenly: Vec<f64> = (1..=200).map(f64::from).collect();
+        assert!(param(&evenly) < 0.1);
+        assert!(over_params(&[], 0.0, 1.0).at(0.5).is_finite());
     }
 
     #[test]

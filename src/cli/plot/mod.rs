@@ -11,7 +11,7 @@ use super::failure::Failure;
 use super::output;
 use rfm::slice;
 
-pub(super) use axes::{Axis, EvenAxis, LogAxis, fitting, grid, right_axis};
+pub(super) use axes::{Axis, EvenAxis, LogAxis, grid, over_figures, over_params, right_axis};
 pub(super) use labels::Labels;
 
 pub(super) const WIDTH: f64 = 760.0;

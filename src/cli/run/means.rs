@@ -103,8 +103,11 @@ impl Means {
                     let (mean, error) = rounded(mean, *error);
                     format!("{separator} {name} {mean} ± {error}{unit}")
                 }
-                None => format!("{separator} {name} {}{unit} (too few samples for its error)", alone(mean)),
+                None => format!("{separator} {name} {}{unit}", alone(mean)),
             };
+        }
+        if self.error.iter().take(self.shown).any(Option::is_none) {
+            line += " (too few samples for an error)";
         }
         if let Some(deviation) = self.deviation {
             line += &match self.known.iter().all(|known| *known == 0.0) {

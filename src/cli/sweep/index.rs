@@ -180,6 +180,14 @@ impl Index {
                 line.iter().zip(&widths).map(|(cell, width)| format!("{cell:>width$}")).collect();
             say!("{}", padded.join("  ").trim_end());
         }
+        if self.names().iter().any(|name| self.is_mean(name)) {
+            say!("figures of probes are means over the second half of their samples, with standard errors");
+        }
+    }
+
+    /// Whether a figure is the mean of a probe.
+    pub fn is_mean(&self, name: &str) -> bool {
+        self.command == "run" && name.contains('.')
     }
 }
 

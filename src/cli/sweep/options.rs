@@ -13,7 +13,7 @@ pub(in crate::cli) struct SweepOptions {
     /// Repeat the command for N values of a param from A to B, both included, or for those of a list, NAME=A,B,…, in
     /// folders of their own, with index.json, a table and a plot beside them; several make a grid. The unit stands
     /// behind the last number: --sweep alpha="0..30 deg:4"
-    #[arg(long, value_name = "NAME=A..B:N", value_parser = sweep)]
+    #[arg(long, value_name = "NAME=A..B:N|A,B,…", value_parser = sweep)]
     pub sweep: Vec<Sweep>,
     /// The folder of a sweep [default: the file's name + .sweep]
     #[arg(long, value_name = "DIR", requires = "sweep")]

@@ -66,11 +66,13 @@ fn panel(index: &Index, name: &str) -> String {
     let right = plot::WIDTH - plot::RIGHT;
     let points = || lines.iter().flat_map(|line| &line.points);
     let places: Vec<f64> = points().map(|point| point[0]).collect();
-    let x = plot::fitting(&places, plot::LEFT, right);
+    let x = plot::over_params(&places, plot::LEFT, right);
     let ends: Vec<f64> = points().flat_map(|[_, value, error]| [value - error, value + error]).collect();
-    let y = plot::fitting(&ends, plot::HEIGHT - plot::BOTTOM, plot::TOP);
+    let values: Vec<f64> = points().map(|point| point[1]).collect();
+    let y = plot::over_figures(&values, &ends, plot::HEIGHT - plot::BOTTOM, plot::TOP);
     let unit = index.figures(name).map(|figure| figure.unit.as_str()).find(|unit| !unit.is_empty());
-    let mut out = plot::begin(&unit.map_or_else(|| name.into(), |unit| format!("{name}, {unit}")));
+    let named = if index.is_mean(name) { format!("{name}, mean of the second half") } else { name.into() };
+    let mut out = plot::begin(&unit.map_or_else(|| named.clone(), |unit| format!("{named}, {unit}")));
     let along = index.sweeps.first().map_or_else(String::new, |axis| slice::escaped(&axis.column()));
     // the title names what goes up
     plot::grid(&mut out, &*x, &*y, [&along, ""], right);
