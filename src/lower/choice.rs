@@ -1,4 +1,5 @@
-//! `where(condition, a, b)` and `if condition then a else b`: one of two values, by a condition that is known now or differs from point to point.
+//! `where(condition, a, b)` and `if condition then a else b`: one of two values, by a condition that is known now or
+//! differs from point to point.
 
 use super::lowering::Lowering;
 use super::value::Value;
@@ -115,6 +116,14 @@ impl Lowering<'_> {
                 })
             }
             ExprKind::Not(inner) => Some(!self.holds(inner)?),
+            ExprKind::Choice { condition, values } => {
+                let [chosen, other] = match self.holds(condition)? {
+                    true => [&values[0], &values[1]],
+                    false => [&values[1], &values[0]],
+                };
+                self.count_as_used(other);
+                self.holds(chosen)
+            }
             ExprKind::Number(_)
             | ExprKind::Quantity { .. }
             | ExprKind::Text(_)
@@ -129,8 +138,7 @@ impl Lowering<'_> {
             | ExprKind::Member { .. }
             | ExprKind::Method { .. }
             | ExprKind::Index { .. }
-            | ExprKind::Fold { .. }
-            | ExprKind::Choice { .. } => None,
+            | ExprKind::Fold { .. } => None,
         }
     }
 

@@ -151,6 +151,15 @@ impl<'a> Names<'a> {
         self.prelude.get(name)
     }
 
+    /// Counts a name as used. Returns the user's function that it stands for, if this is its first use.
+    pub fn first_use(&mut self, source: SourceId, name: &str) -> Option<&'a Function> {
+        let was_used = self.of(source, name).is_none_or(|global| global.used);
+        match self.get(source, name)?.kind {
+            Kind::Function(function) if !was_used => Some(function),
+            Kind::Function(_) | Kind::Value(_) | Kind::Solid(_) | Kind::Scene | Kind::Import(_) => None,
+        }
+    }
+
     /// A function whose first parameter is called `shape`, which may be called as a method; counts as a use.
     pub fn function_of_shapes(&mut self, source: SourceId, name: &str) -> Option<(&'a Function, SourceId)> {
         if source.is_users()

@@ -2,7 +2,7 @@
 
 use super::lowering::Lowering;
 use crate::diagnostic::{Code, Diagnostic};
-use crate::syntax::ast::{Entry, Expr, ExprKind, Function, Item, Name};
+use crate::syntax::ast::{Entry, Expr, ExprKind, Function, Item};
 
 impl Lowering<'_> {
     /// Warns of names that nothing mentions.
@@ -39,25 +39,54 @@ impl Lowering<'_> {
         }
     }
 
-    /// Counts the names of an expression as used that is not evaluated.
+    /// Counts the names of an expression as used that is not evaluated, and those of the functions that it calls.
     pub fn count_as_used(&mut self, expr: &Expr) {
-        let source = self.scope.source;
+        let mut locals = self.scope.locals.iter().map(|local| local.name.clone()).collect();
+        self.count_names(expr, &mut locals);
+    }
+
+    fn count_names(&mut self, expr: &Expr, locals: &mut Vec<String>) {
         match &expr.kind {
-            ExprKind::Name(name) | ExprKind::Call { function: Name { text: name, .. }, .. } => {
-                let is_local = self.scope.locals.iter().any(|local| local.name == *name);
-                if !is_local {
-                    self.names.get(source, name);
-                }
-            }
+            ExprKind::Name(name) => self.count_name(name, locals),
+            ExprKind::Call { function, .. } => self.count_name(&function.text, locals),
             ExprKind::Method { receiver, method, .. } => {
-                self.names.function_of_shapes(source, &method.text);
+                self.count_name(&method.text, &[]);
                 self.count_file_as_used(receiver);
             }
             ExprKind::Member { of, .. } => self.count_file_as_used(of),
-            _ => {}
+            ExprKind::Fold { variable, members, body, .. } => {
+                members.exprs().into_iter().for_each(|part| self.count_names(part, locals));
+                locals.push(variable.text.clone());
+                self.count_names(body, locals);
+                locals.pop();
+                return;
+            }
+            ExprKind::Number(_)
+            | ExprKind::Quantity { .. }
+            | ExprKind::Text(_)
+            | ExprKind::Vector(_)
+            | ExprKind::Logic { .. }
+            | ExprKind::Not(_)
+            | ExprKind::Negate(_)
+            | ExprKind::Compare { .. }
+            | ExprKind::Sum { .. }
+            | ExprKind::Product { .. }
+            | ExprKind::Power { .. }
+            | ExprKind::Component { .. }
+            | ExprKind::Index { .. }
+            | ExprKind::Choice { .. } => {}
         }
-        for part in expr.children() {
-            self.count_as_used(part);
+        expr.children().into_iter().for_each(|part| self.count_names(part, locals));
+    }
+
+    fn count_name(&mut self, name: &str, locals: &[String]) {
+        if locals.iter().any(|local| local == name) {
+            return;
+        }
+        if let Some(function) = self.names.first_use(self.scope.source, name) {
+            let mut own = function.parameters.iter().map(|parameter| parameter.name.text.clone()).collect();
+            let defaults = function.parameters.iter().filter_map(|parameter| parameter.default.as_ref());
+            defaults.chain([&function.body]).for_each(|part| self.count_names(part, &mut own));
         }
     }
 

@@ -113,17 +113,18 @@ fn syntax_error(source: &Source, start: usize, end: usize, error: &Error<Rule>) 
         let message = format!("`{found}` is a word of the language and cannot be a name");
         return Diagnostic::error(Code::SYNTAX, span, message).help("choose another name");
     }
-    if let ErrorVariant::ParsingError { positives, .. } = &error.variant
-        && let Some(word) = missing_word(positives, found)
-    {
+    let slip = Slip { text: &source.text, start, at, found, span };
+    let missing = missing_word(error);
+    // what ends a condition in other languages lacks a word here, and a word or number may be a slip within it
+    let explained = if missing.is_some() && ENDS_A_VALUE.contains(&found) { None } else { slip.explained() };
+    if let Some(diagnostic) = explained {
+        return diagnostic;
+    }
+    if let Some(word) = missing {
         let what = if found.is_empty() { "end of the item".to_string() } else { format!("`{found}`") };
         return Diagnostic::error(Code::SYNTAX, span, format!("unexpected {what}"))
             .at(format!("expected `{word}`"))
             .help(foreign::CONDITION);
-    }
-    let slip = Slip { text: &source.text, start, at, found, span };
-    if let Some(diagnostic) = slip.explained() {
-        return diagnostic;
     }
     let strange = source.text[at..end.max(at)].chars().next().filter(|c| c.is_control() && found.is_empty());
     let what = match strange {
@@ -143,15 +144,15 @@ fn syntax_error(source: &Source, start: usize, end: usize, error: &Error<Rule>) 
     if expected.is_empty() { diagnostic } else { diagnostic.at(format!("expected {expected}")) }
 }
 
-/// The word that an `if` lacks in front of what was found; `None` if that may be a slip within its condition or value.
-fn missing_word(expected: &[Rule], found: &str) -> Option<&'static str> {
-    let stops = matches!(found, "" | "{" | "}" | "[" | "]" | ")" | ":" | "," | ";" | "?");
-    if !stops && !found.starts_with(|c: char| c.is_alphanumeric()) {
-        return None;
-    }
-    if expected.contains(&Rule::kw_then) {
+/// What ends the condition or the value of an `if` without its next word.
+const ENDS_A_VALUE: [&str; 11] = ["", "{", "}", "[", "]", ")", ":", ",", ";", "?", "elif"];
+
+/// The word that an `if` lacks where the grammar went no further.
+fn missing_word(error: &Error<Rule>) -> Option<&'static str> {
+    let ErrorVariant::ParsingError { positives, .. } = &error.variant else { return None };
+    if positives.contains(&Rule::kw_then) {
         Some("then")
-    } else if expected.contains(&Rule::kw_else) {
+    } else if positives.contains(&Rule::kw_else) {
         Some("else")
     } else {
         None
@@ -279,7 +280,7 @@ impl Scan {
                         attributed = false;
                         scan.items.push(at);
                         nesting = Nesting::default(); // an unclosed bracket above is that item's error
-                    } else if begins_a_fold(word, &text[at..]) {
+                    } else if takes_the_rest(word, &text[at..]) {
                         nesting.fold();
                     }
                 }
@@ -294,8 +295,9 @@ impl Scan {
     }
 }
 
-/// Whether a word begins a fold or a choice at this place, which take everything to their right. Those that are functions as well do so in front of a name.
-fn begins_a_fold(word: &str, from: &str) -> bool {
+/// Whether a word begins a fold or a choice at this place, which take everything to their right. Those that are
+/// functions as well do so in front of a name.
+fn takes_the_rest(word: &str, from: &str) -> bool {
     match word {
         "any" | "all" | "if" => true,
         "sum" | "product" | "min" | "max" => {

@@ -275,7 +275,8 @@ impl<'t> Slip<'t> {
             true => format!("`{left} {sign} {right}`"),
             false => format!("`a {sign} b`"),
         };
-        if is_condition(before) {
+        let of_space = |text: &str| words(text).any(|word| matches!(word, "x" | "y" | "z"));
+        if is_condition(before) && !of_space(left) && !of_space(right) {
             let help = format!("write {} between numbers", compared("=="));
             return Some(Diagnostic::error(Code::EQUALITY, self.span, "`=` does not compare").help(help));
         }
@@ -424,10 +425,16 @@ fn last_number(text: &str) -> &str {
     &text[text.trim_end_matches(|c: char| c.is_ascii_digit() || c == '.').len()..]
 }
 
-/// Whether a text ends within the condition of an `if`.
+/// The words of a text, the last one first.
+fn words(text: &str) -> impl Iterator<Item = &str> {
+    text.split(|c: char| !c.is_alphanumeric() && c != '_').rev()
+}
+
+/// Whether a text ends within the condition of an `if`. A line with a comment or a text in it is not looked at.
 fn is_condition(text: &str) -> bool {
-    let words = || text.split(|c: char| !c.is_alphanumeric() && c != '_').rev();
-    words().find(|word| ["if", "then"].contains(word)) == Some("if")
+    let line = text.rfind('\n').map_or(text, |end| &text[end..]);
+    let last = words(line).find(|word| ["if", "then"].contains(word));
+    !line.contains(['#', '"']) && last == Some("if")
 }
 
 fn last_word(text: &str) -> &str {

@@ -63,6 +63,7 @@ fn numbers_of_steps_and_functions() {
         ("where(2 == 3 or 1 != 1, 1, 2)", 2.0),
         ("if 2 == 3 then 1/0 else if not 1 != 1 then 2 else 3", 2.0),
         ("if 1 > 0 then 4 else 5 + 6", 4.0),
+        ("if (if 1 > 0 then 2 == 2 else 2 == 3) then 7 else 8", 7.0),
         ("(if 0 > 1 then 4 else 5) + 6", 11.0),
         ("sum i in 1..5: i^2", 30.0),
         ("product i in 1..6: i", 120.0),
@@ -106,7 +107,7 @@ fn choices_are_written_in_two_ways() {
 
 #[test]
 fn names_in_what_is_left_out_are_used() {
-    let text = "rfm 1\nparam wide = 1\nlet r = 2\nlet unused = 3\nfn tall(shape) = shape\n\
+    let text = "rfm 1\nparam wide = 1\nlet r = 2\nlet height = 3\nlet unused = 3\nfn tall(shape) = shape.scale(height)\n\
                 solid s = if wide == 1 then sphere(1) else sphere(r).tall()\n";
     let warnings = Program::from_source("t.rfm", text).unwrap().warnings();
     let found: Vec<&str> = warnings.list.iter().map(|d| d.message.as_str()).collect();
