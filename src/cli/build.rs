@@ -85,7 +85,7 @@ fn without_formulas(program: &Program, solid: &Solid) -> Option<Diagnostics> {
     let root = module.solids.iter().find(|known| known.name == solid.name())?.node;
     let used = module.graph.reachable(&[root]);
     let lookups = module.graph.nodes().filter(|(node, _)| used[node.index()]);
-    let list: Vec<Diagnostic> = lookups
+    let mut list: Vec<Diagnostic> = lookups
         .filter_map(|(node, expr)| {
             let Expr::Lookup(lookup, _) = expr else { return None };
             let what = module.graph.tables()[lookup.table as usize].what();
@@ -95,6 +95,9 @@ fn without_formulas(program: &Program, solid: &Solid) -> Option<Diagnostics> {
             Some(diagnostic.at("looked up in a table, which is no formula").help(help))
         })
         .collect();
+    // copies of one part are one mistake
+    let mut seen = std::collections::HashSet::new();
+    list.retain(|diagnostic| seen.insert(diagnostic.primary.span.range()));
     (!list.is_empty()).then(|| Diagnostics { list, sources: program.sources().to_vec().into() })
 }
 

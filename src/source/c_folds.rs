@@ -156,13 +156,12 @@ fn placed(chunks: Vec<Chunk>, outputs: &[Node]) -> (Vec<Step>, usize) {
     let mut steps = Vec::with_capacity(chunks.len());
     for (i, chunk) in chunks.into_iter().enumerate() {
         let reads: Vec<i64> = chunk.reads.iter().map(|node| places[node]).collect();
-        let take = || {
+        let mut take = || {
             free.pop().unwrap_or_else(|| {
                 columns += 1;
                 columns - 1
             })
         };
-        let mut take = take;
         let writes = chunk.writes.iter().map(|&node| *places.entry(node).or_insert_with(&mut take)).collect();
         // only now: what a chunk reads must not be where it writes
         let over = chunk.reads.iter().filter(|node| last_read[*node] == i).map(|node| places[node]);

@@ -84,7 +84,7 @@ pub(super) fn simplified(
         if own.hausdorff() > tolerance {
             note(format!(
                 "before it is simplified the mesh is already {:.2e} m from the surface, more than the \
-                 {tolerance:.2e} m asked for; try more cells, or --method dc for sharp edges",
+                 {tolerance:.2e} m asked for; try more cells, or --method dc for sharp edges if it was made by mc",
                 own.hausdorff()
             ));
             *mesh = less;

@@ -268,13 +268,14 @@ fn a_part_that_is_no_formula_is_shown() {
                 solid free = sphere(1)\n";
     std::fs::write(folder.path().join("a.rfm"), file).unwrap();
     std::fs::write(folder.path().join("ground.csv"), "0,1\n1,0\n").unwrap();
-    let refused = rfm(folder.path(), &["build", "a.rfm", "-s", "hill", "-o", "hill.c"]).transcript();
+    let refused =
+        rfm(folder.path(), &["build", "a.rfm", "-s", "hill", "-o", "hill.c"]).expect(1).transcript();
     for part in ["E0219", "`hill` cannot be written as source: it has a height map", "a.rfm:2:25", "rfm mesh"]
     {
         assert!(refused.contains(part), "{part}\n{refused}");
     }
     assert!(!folder.path().join("hill.c").exists());
-    rfm(folder.path(), &["build", "a.rfm", "-s", "free", "-o", "free.c"]);
+    rfm(folder.path(), &["build", "a.rfm", "-s", "free", "-o", "free.c"]).expect(0);
     assert!(folder.path().join("free.c").exists());
 }
 
