@@ -112,7 +112,7 @@ pub fn in_motion(room: &mut Room) {
     let _viewer = open(room, &["paddle.rfm", "-D", "particles=500", "--mesh-cells", "192"]);
     room.browser.wait_for("!viewer.run.playing");
     // while it plays its mesh may be older than its frame; at rest, and after a step, it belongs to the same instant
-    let same_instant = "viewer.meshes[0].time === viewer.timeline.frames.at(-1).time";
+    let same_instant = "viewer.meshes[0] && viewer.meshes[0].time === viewer.timeline.frames.at(-1)?.time";
     room.browser.wait_for(same_instant);
     let time = room.browser.number("viewer.timeline.frames.at(-1).time");
     room.browser.click("#forward");

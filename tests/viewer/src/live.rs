@@ -139,10 +139,10 @@ pub fn moving_solid(room: &mut Room) {
     room.browser.wait_for("window.viewer && viewer.run.playing && viewer.timeline.frames.length > 10");
     assert_eq!(room.browser.eval("document.getElementById('transport').hidden"), false);
     assert_eq!(room.browser.number("viewer.setting.arrays.length"), 0.0);
-    room.browser.wait_for("viewer.meshes[0].time > 0.3");
+    room.browser.wait_for("viewer.meshes[0]?.time > 0.3");
     room.browser.click("#play");
     room.browser.wait_for("!viewer.run.playing");
-    let same_instant = "viewer.meshes[0].time === viewer.timeline.frames.at(-1).time";
+    let same_instant = "viewer.meshes[0] && viewer.meshes[0].time === viewer.timeline.frames.at(-1)?.time";
     room.browser.wait_for(same_instant);
     let time = room.browser.number("viewer.timeline.frames.at(-1).time");
     room.browser.click("#forward");
