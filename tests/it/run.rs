@@ -572,39 +572,3 @@ fn a_file_that_a_scene_reads_is_named_if_a_run_cannot_go_on() {
         "{refused}"
     );
 }
-
-#[test]
-fn a_truth_that_changes_is_compared_from_where_it_is_known() {
-    let folder = tempfile::tempdir().unwrap();
-    let here = folder.path();
-    let with = |truth: &str| {
-        let text = scene("wcsph", "until: 20 ms, save_every: 5 ms");
-        std::fs::write(
-            here.join("drop.rfm"),
-            text.replace("  method:", &format!("  truth {{ {truth} }}\n  method:")),
-        )
-        .unwrap();
-    };
-    let error = |out: &str| {
-        let text = std::fs::read_to_string(here.join(out).join("summary.json")).unwrap();
-        let summary: serde_json::Value = serde_json::from_str(&text).unwrap();
-        summary["velocity_error"].as_f64().unwrap()
-    };
-    with("velocity: [0, 0, -9.81*t]");
-    run(here, &["out"]).expect(0);
-
-    // one that holds already is refused: the instants that have passed were compared with another one
-    with("velocity: [0, 0, -9*t], from: 15 ms");
-    let refused = run(here, &["out", "--resume", "--until", "0.04"]).expect(2).stderr;
-    assert!(refused.contains("`truth` has changed") && refused.contains("from t = 0.015 s"), "{refused}");
-
-    // one that begins later is compared as in a run in one go
-    with("velocity: [0, 0, -9*t], from: 25 ms");
-    run(here, &["out", "--resume", "--until", "0.04"]).expect(0);
-    run(here, &["whole", "--until", "0.04"]).expect(0);
-    assert_eq!(error("out"), error("whole"));
-    // and goes on
-    run(here, &["out", "--resume", "--until", "0.05"]).expect(0);
-    run(here, &["longer", "--until", "0.05"]).expect(0);
-    assert_eq!(error("out"), error("longer"));
-}

@@ -501,3 +501,42 @@ fn the_lowest_standing_wave_has_its_period() {
     println!("half a period after {half:.4} s, a whole one after {whole:.4} s; known {known:.4} s");
     assert!((whole / known - 1.0).abs() < 0.04, "{whole}, known {known}");
 }
+
+#[test]
+fn a_truth_that_changes_is_compared_from_where_it_is_known() {
+    let folder = tempfile::tempdir().unwrap();
+    let here = folder.path();
+    let with = |truth: &str| {
+        let text = format!(
+            "rfm 1\nscene drop {{\n  box {{ max: [1, 1, 1] }}\n  fluid water {{ shape: ball([0.5, 0.5, 0.5], 0.14), \
+             fill: middle, spacing: 0.03, viscosity: 0.5 }}\n  truth {{ {truth} }}\n  \
+             run {{ until: 20 ms, save_every: 5 ms }}\n}}\n"
+        );
+        std::fs::write(here.join("drop.rfm"), text).unwrap();
+    };
+    let run = |out: &str, flags: &[&str]| {
+        rfm(here, &[&["run", "drop.rfm", "--no-pictures", "-o", out], flags].concat())
+    };
+    let error = |out: &str| {
+        let text = std::fs::read_to_string(here.join(out).join("summary.json")).unwrap();
+        let summary: serde_json::Value = serde_json::from_str(&text).unwrap();
+        summary["velocity_error"].as_f64().unwrap()
+    };
+    with("velocity: [0, 0, -9.81*t]");
+    run("out", &[]).expect(0);
+
+    // one that holds already is refused: the instants that have passed were compared with another one
+    with("velocity: [0, 0, -9*t], from: 15 ms");
+    let refused = run("out", &["--resume", "--until", "0.04"]).expect(2).stderr;
+    assert!(refused.contains("`truth` has changed") && refused.contains("from t = 0.015 s"), "{refused}");
+
+    // one that begins later is compared as in a run in one go
+    with("velocity: [0, 0, -9*t], from: 25 ms");
+    run("out", &["--resume", "--until", "0.04"]).expect(0);
+    run("whole", &["--until", "0.04"]).expect(0);
+    assert_eq!(error("out"), error("whole"));
+    // and goes on
+    run("out", &["--resume", "--until", "0.05"]).expect(0);
+    run("longer", &["--until", "0.05"]).expect(0);
+    assert_eq!(error("out"), error("longer"));
+}
