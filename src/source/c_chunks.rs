@@ -39,6 +39,27 @@ pub(super) fn chunks(graph: &Graph, inputs: &[Node], outputs: &[Node]) -> Option
     Some(chunks)
 }
 
+/// How many results are carried on across each place of an order of operations, without those that wait for `far` or more of
+/// them. `last_read` is for each node the place of its last reader.
+pub(super) fn carried(order: &[Node], last_read: &[usize], far: usize) -> Vec<usize> {
+    let mut changes = vec![0isize; order.len() + 2];
+    for (i, node) in order.iter().enumerate() {
+        let last = last_read[node.index()];
+        if last > i && last - i < far {
+            changes[i + 1] += 1;
+            changes[last + 1] -= 1;
+        }
+    }
+    let mut now = 0isize;
+    changes
+        .into_iter()
+        .map(|change| {
+            now += change;
+            now.unsigned_abs()
+        })
+        .collect()
+}
+
 struct PieceOf<'a> {
     graph: &'a Graph,
     outputs: &'a [Node],
@@ -94,7 +115,7 @@ impl<'a> PieceOf<'a> {
 
     /// The ends of the chunks.
     fn cuts(&self) -> Vec<usize> {
-        let carried = self.carried();
+        let carried = carried(&self.order, &self.last_read, usize::MAX);
         let (mut cuts, mut start) = (Vec::new(), 0);
         while start < self.order.len() {
             let window = (start + LEAST).min(self.order.len())..=(start + WINDOW).min(self.order.len());
@@ -103,26 +124,6 @@ impl<'a> PieceOf<'a> {
             start = end;
         }
         cuts
-    }
-
-    /// How many results are carried on across each place.
-    fn carried(&self) -> Vec<usize> {
-        let mut changes = vec![0isize; self.order.len() + 2];
-        for (i, node) in self.order.iter().enumerate() {
-            let last = self.last_read[node.index()];
-            if last > i {
-                changes[i + 1] += 1;
-                changes[last + 1] -= 1;
-            }
-        }
-        let mut now = 0isize;
-        changes
-            .into_iter()
-            .map(|change| {
-                now += change;
-                now.unsigned_abs()
-            })
-            .collect()
     }
 
     fn chunk(&self, start: usize, end: usize) -> Chunk {

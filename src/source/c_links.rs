@@ -9,6 +9,7 @@ use std::hash::{Hash, Hasher};
 
 use rustc_hash::FxHasher;
 
+use super::c_chunks::carried;
 use crate::ir::{Binary, Expr, Graph, Node, R0, Unary, UnaryFunction};
 
 /// A cut is sought within this number of operations. Where parts have few shapes, long chunks need fewer columns; where
@@ -99,7 +100,7 @@ impl<'a> Formula<'a> {
     /// What joins two parts is a chunk of its own: with others in many orders, it would be compiled as often. The second
     /// result is the number of operations in chunks that differ.
     fn cuts(&self, window: usize) -> (Vec<usize>, usize) {
-        let carried = self.carried();
+        let carried = carried(&self.order, &self.last_read, FAR);
         let (mut cuts, mut start, mut different) = (Vec::new(), 0, 0);
         let mut seen: HashSet<u64> = HashSet::new();
         while start < self.order.len() {
@@ -186,26 +187,6 @@ impl<'a> Formula<'a> {
             }
             _ => None,
         }
-    }
-
-    /// How many results are carried on across each place, without those that wait for long.
-    fn carried(&self) -> Vec<usize> {
-        let mut changes = vec![0isize; self.order.len() + 2];
-        for (i, node) in self.order.iter().enumerate() {
-            let last = self.last_read[node.index()];
-            if last > i && last < i + FAR {
-                changes[i + 1] += 1;
-                changes[last + 1] -= 1;
-            }
-        }
-        let mut now = 0isize;
-        changes
-            .into_iter()
-            .map(|change| {
-                now += change;
-                now.unsigned_abs()
-            })
-            .collect()
     }
 
     fn chunk(&self, start: usize, end: usize) -> Chunk {
