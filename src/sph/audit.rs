@@ -238,7 +238,7 @@ impl Audit {
             allowed: 0.0,
             gained: 0.0,
             is_moved,
-            is_rough: parameters.method.numerics().noted() == Noted::Work,
+            is_rough: parameters.method.numerics().noted() == Noted::Friction,
             power: mass * sums.power,
             places: sums.places,
             excess: 0.0,

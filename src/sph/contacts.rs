@@ -18,6 +18,10 @@ pub struct Contacts {
     work_now: Mutex<Vec<(usize, f64)>>,
     /// Work of moving walls on the fluid, J, that has not been fetched yet.
     work: f64,
+    /// Accelerations by viscosity in the present step, m/s², with the particles' indices, as they are found.
+    drags_now: Mutex<Vec<(usize, DVec3)>>,
+    /// The same in the order of the particles.
+    drags: Vec<(usize, DVec3)>,
 }
 
 /// A change of a particle's velocity by an obstacle.
@@ -60,6 +64,17 @@ impl Contacts {
         }
     }
 
+    /// Notes the acceleration of a particle near walls by viscosity, m/s².
+    pub fn note_drag(&self, particle: usize, drag: DVec3) {
+        self.drags_now.lock().unwrap_or_else(PoisonError::into_inner).push((particle, drag));
+    }
+
+    /// That acceleration, m/s², of the last step; zero where none was noted.
+    pub fn drag(&self, particle: usize) -> DVec3 {
+        let found = self.drags.binary_search_by_key(&particle, |(noted, _)| *noted);
+        found.map_or(DVec3::ZERO, |k| self.drags[k].1)
+    }
+
     /// Adds the hits of the step to the totals, particle by particle, so that the sum does not depend on
     /// which thread was first.
     pub fn settle(&mut self, mass: f64) {
@@ -76,6 +91,10 @@ impl Contacts {
         let now = self.work_now.get_mut().unwrap_or_else(PoisonError::into_inner);
         now.sort_by_key(|(particle, _)| *particle);
         self.work += mass * now.drain(..).map(|(_, work)| work).sum::<f64>();
+        let now = self.drags_now.get_mut().unwrap_or_else(PoisonError::into_inner);
+        self.drags.clear();
+        self.drags.append(now);
+        self.drags.sort_unstable_by_key(|(particle, _)| *particle);
     }
 
     /// The work of moving walls on the fluid, J, since the last call.

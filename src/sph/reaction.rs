@@ -1,5 +1,7 @@
 //! What walls do to particles in a step, noted for the force on obstacles and for the work of walls.
 
+use glam::DVec3;
+
 use super::{
     contacts::Contacts,
     core::Core,
@@ -17,8 +19,8 @@ const TURNS: u32 = 8;
 pub struct Reaction<'a> {
     core: &'a Core,
     contacts: &'a Contacts,
-    /// Whether forces are noted, and not only work.
-    are_forces: bool,
+    /// What is noted of the forces, and not only of work.
+    forces: Noted,
     /// Length of the step, s.
     dt: f64,
 }
@@ -29,11 +31,11 @@ impl<'a> Reaction<'a> {
     pub fn of(core: &'a Core, dt: f64) -> Option<Self> {
         let noted = core.parameters.method.numerics().noted();
         let is_noted = dt > 0.0 && noted != Noted::Nothing;
-        let are_forces = |contacts: &Contacts| noted == Noted::Forces && contacts.are_for_forces();
+        let forces = |contacts: &Contacts| if contacts.are_for_forces() { noted } else { Noted::Nothing };
         core.contacts.as_ref().filter(|_| is_noted).map(|contacts| Self {
             core,
             contacts,
-            are_forces: are_forces(contacts),
+            forces: forces(contacts),
             dt,
         })
     }
@@ -44,11 +46,19 @@ impl<'a> Reaction<'a> {
         (id + self.core.steps).is_multiple_of(u64::from(TURNS))
     }
 
+    /// Notes the acceleration of a particle near walls by viscosity, m/s², if forces follow from the pressure in front
+    /// of surfaces: all the rest is by pressure and gravity.
+    pub fn note_drag(&self, i: usize, drag: DVec3) {
+        if self.forces == Noted::Friction {
+            self.contacts.note_drag(i, drag);
+        }
+    }
+
     /// Notes what walls do to a particle. If only work is noted, a force that only one wall can have caused
     /// is not divided. To divide a force of several walls takes long, so all of it counts as that of the
     /// moving one. In one of [`TURNS`] steps the error of this is found, and applied to all of them.
     pub fn add(&self, i: usize, pushed: Pushed) {
-        if pushed == Pushed::default() {
+        if pushed.is_nothing() {
             return;
         }
         let (at, wall, boundary) =
@@ -59,10 +69,15 @@ impl<'a> Reaction<'a> {
                 * (share.by_pressure.dot(boundary.wall_velocity(obstacle, at))
                     + share.by_friction.dot(boundary.velocity_along(obstacle, at)))
         };
-        if self.are_forces {
+        let force: Option<fn(Share) -> DVec3> = match self.forces {
+            Noted::Nothing => None,
+            Noted::Friction => Some(|share| share.by_friction),
+            Noted::Forces => Some(|share| share.by_pressure + share.by_friction),
+        };
+        if let Some(force) = force {
             return boundary.divide(wall, at, &pushed, |obstacle, share| {
                 self.contacts.add_work(i, work(obstacle, share));
-                self.contacts.add(i, obstacle, self.dt * (share.by_pressure + share.by_friction), at);
+                self.contacts.add(i, obstacle, self.dt * force(share), at);
             });
         }
         let (moving, is_alone) = match boundary.moving_near(at, wall.h) {

@@ -30,9 +30,9 @@ pub(crate) struct StatedSound {
 pub(in crate::sph) enum Noted {
     /// Nothing besides contacts.
     Nothing,
-    /// The work of walls, to a tenth. Forces on obstacles are those of contacts, and of the pressure in front of
-    /// their surfaces.
-    Work,
+    /// The friction of walls, and their work to a tenth. Forces on obstacles are those of contacts and friction, and of
+    /// the pressure in front of their surfaces.
+    Friction,
     /// The forces of walls, and so their work.
     Forces,
 }

@@ -167,10 +167,9 @@ impl Gauge {
                     (core.time, core.contacts.as_ref().map_or([0.0; 6], |c| c.total(obstacle)));
                 let passed = time - self.last[0];
                 let is_complete = core.parameters.method.numerics().noted() == Noted::Forces;
-                let mut force = if is_complete && passed > 0.0 {
-                    [0.0; 6]
-                } else {
-                    force::on_surface(core, obstacle, about)
+                let mut force = match passed > 0.0 {
+                    true if is_complete => [0.0; 6],
+                    is_noted => force::on_surface(core, obstacle, about, !is_noted),
                 };
                 if passed > 0.0 {
                     let impulse = force::about(std::array::from_fn(|k| total[k] - self.last[1 + k]), about);

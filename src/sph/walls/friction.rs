@@ -127,8 +127,7 @@ impl Friction for WallDrag {
     }
 
     fn complete(&self, drag: DVec3, velocity: DVec3, viscosity: f64) -> DVec3 {
-        let friction = self.mirrored(drag) - 2.0 * viscosity * (self.tensor * velocity - self.haul);
-        friction / (1.0 - self.beyond).max(LEAST_FREE)
+        (self.mirrored(drag) + self.rub(velocity, viscosity)) / (1.0 - self.beyond).max(LEAST_FREE)
     }
 
     fn by_walls(&self, drag: DVec3, velocity: DVec3, viscosity: f64) -> DVec3 {
@@ -137,6 +136,11 @@ impl Friction for WallDrag {
 }
 
 impl WallDrag {
+    /// The acceleration, m/s², of a fluid with a velocity, m/s, that goes on linearly behind the walls.
+    pub(super) fn rub(&self, velocity: DVec3, viscosity: f64) -> DVec3 {
+        -2.0 * viscosity * (self.tensor * velocity - self.haul)
+    }
+
     /// The acceleration by the fluid, which continues behind walls along which it slips.
     fn mirrored(&self, drag: DVec3) -> DVec3 {
         drag / (1.0 - self.slippery).max(LEAST_FREE)

@@ -7,6 +7,7 @@ use super::{
     boundary::{Boundary, FLUSH},
     corner::{Corner, Seen},
     coverage::{Coverage, is_positive_definite},
+    friction::WallDrag,
     layers::Wall,
     symmetric::Symmetric,
 };
@@ -36,6 +37,18 @@ pub(in crate::sph) struct Pushed {
     pub gradient: DVec3,
     /// The acceleration by friction, m/s².
     pub by_friction: DVec3,
+    /// The velocity of the particle, m/s, and the kinematic viscosity, m²/s, with which walls rub on it; zero
+    /// without friction.
+    pub velocity: DVec3,
+    pub viscosity: f64,
+}
+
+impl Pushed {
+    /// Whether walls do nothing.
+    pub fn is_nothing(&self) -> bool {
+        let Self { by_pressure, factor, by_friction, .. } = *self;
+        (by_pressure, factor, by_friction) == (DVec3::ZERO, 0.0, DVec3::ZERO)
+    }
 }
 
 /// The part of one obstacle in that, m/s².
@@ -74,6 +87,8 @@ struct Near {
     moment: DMat3,
     /// Whether the fluid sticks to it. The friction is that of such walls alone.
     sticks: bool,
+    /// Its friction, were it alone.
+    friction: WallDrag,
 }
 
 /// A face of a wall near a particle.
@@ -109,8 +124,10 @@ impl Boundary {
     /// up to nothing. (Divided by the normals, the floor of a vessel had to hold up the images too, and bore
     /// 10 % less than the water on it with ten spacings from wall to wall.)
     ///
-    /// Friction is divided among the walls to which the fluid sticks, by the directions along them. All
-    /// shares, that of the box included, add up to the whole.
+    /// Each wall to which the fluid sticks rubs as if it were alone, and so do walls on both sides of a narrow
+    /// gap, which rub against each other. What is left, because walls overlap in a corner or the velocity bends
+    /// towards them, is divided among them by the directions along them. All shares, that of the box included, add
+    /// up to the whole.
     pub fn divide(&self, wall: &Wall, p: DVec3, pushed: &Pushed, mut tell: impl FnMut(usize, Share)) {
         let mut near = self.near(wall, p);
         if let [] | [_] = &near[..] {
@@ -119,12 +136,15 @@ impl Boundary {
             }
             return;
         }
+        let alone: SmallVec<[f64; 4]> = near.iter().map(|near| near.part).collect();
         let in_corner = self.press_in_corners(wall, p, &mut near);
+        let rubbed: SmallVec<[DVec3; 4]> =
+            near.iter().zip(&alone).map(|(near, alone)| near.part / alone * near.rub(pushed)).collect();
         // that of strongly bent faces, and of thin walls, may have no share to give along their normals
         for near in near.iter_mut().filter(|near| !is_positive_definite(&near.moment)) {
             near.moment = near.part * DMat3::IDENTITY;
         }
-        let Pushed { by_pressure, factor, gradient, by_friction } = *pushed;
+        let Pushed { by_pressure, factor, gradient, by_friction, .. } = *pushed;
         let sum = |weight: fn(&Near) -> DMat3, of: fn(&Near) -> bool| {
             near.iter().filter(|near| of(near)).fold(DMat3::ZERO, |all, near| all + weight(near))
         };
@@ -133,11 +153,11 @@ impl Boundary {
         let pressed = |near: &Near| factor * near.gradient + near.moment * completed;
         let left = solved(sum(share, |_| true), by_pressure - near.iter().map(pressed).sum::<DVec3>());
         let rubs = near.iter().any(|near| near.sticks && near.part > 0.0);
-        let friction =
-            if rubs { solved(sum(Near::along, |near| near.sticks), by_friction) } else { DVec3::ZERO };
-        for near in &near {
+        let bent = by_friction - rubbed.iter().sum::<DVec3>();
+        let bent = if rubs { solved(sum(Near::along, |near| near.sticks), bent) } else { DVec3::ZERO };
+        for (near, rubbed) in near.iter().zip(rubbed) {
             let Some(obstacle) = near.obstacle else { continue };
-            let by_friction = if near.sticks { near.along() * friction } else { DVec3::ZERO };
+            let by_friction = if near.sticks { rubbed + near.along() * bent } else { DVec3::ZERO };
             tell(obstacle, Share { by_pressure: pressed(near) + share(near) * left, by_friction });
         }
     }
@@ -294,13 +314,14 @@ impl Boundary {
 
     /// The walls within reach of a particle that at least one wall is near.
     fn near(&self, wall: &Wall, p: DVec3) -> SmallVec<[Near; 4]> {
-        let near = |obstacle: Option<usize>, coverage: &Coverage<()>| {
+        let near = |obstacle: Option<usize>, coverage: &Coverage<WallDrag>| {
             let slip = obstacle.map_or(self.slip, |k| self.obstacles[k].slip);
-            let (part, Seen { gradient, moment }) = (coverage.part, Seen::of(coverage));
-            Near { obstacle, part, gradient, moment, sticks: slip == Slip::No }
+            let Coverage { part, friction, .. } = *coverage;
+            let Seen { gradient, moment } = Seen::of(&coverage.without_friction());
+            Near { obstacle, part, gradient, moment, sticks: slip == Slip::No, friction }
         };
         let mut found: SmallVec<[Near; 4]> = SmallVec::new();
-        let of_box = self.of_box::<(), ()>(wall, p);
+        let of_box = self.of_box::<WallDrag, ()>(wall, p);
         if of_box.part > 0.0 {
             found.push(near(None, &of_box));
         }
@@ -314,7 +335,7 @@ impl Boundary {
                 continue;
             }
             let coverage =
-                Coverage::<()>::default().or(&self.of_faces(wall, p, self.faces_before(wall, p, k), k));
+                Coverage::<WallDrag>::default().or(&self.of_faces(wall, p, self.faces_before(wall, p, k), k));
             if coverage.part > 0.0 {
                 found.push(near(Some(k), &coverage));
             }
@@ -385,6 +406,11 @@ impl Near {
         self.moment += times * seen.moment;
     }
 
+    /// The acceleration by its friction, m/s², were it alone and the velocity of the fluid not bent.
+    fn rub(&self, Pushed { velocity, viscosity, .. }: &Pushed) -> DVec3 {
+        self.friction.rub(*velocity, *viscosity)
+    }
+
     /// λ·(n⊗n), and a little in all directions.
     fn across(&self) -> DMat3 {
         self.part * (self.square_of_normal() + BESIDE * DMat3::IDENTITY)
@@ -444,7 +470,7 @@ mod tests {
     #[test]
     fn one_wall_has_all() {
         let push = DVec3::new(3.0, 1.0, 2.0);
-        let pushed = Pushed { by_pressure: push, factor: -7.0, gradient: DVec3::ZERO, by_friction: push };
+        let pushed = Pushed { by_pressure: push, factor: -7.0, by_friction: push, ..Pushed::default() };
         assert_eq!(shares(&boundary(9.0), DVec3::new(0.2, 0.0, 2.0), pushed), [2.0 * push, DVec3::ZERO]);
     }
 
@@ -494,6 +520,7 @@ mod tests {
             factor: -4.0,
             gradient: DVec3::new(0.0, 0.0, -1.1),
             by_friction: DVec3::new(1.0, 2.0, 0.0),
+            ..Pushed::default()
         };
         let twice = Boundary { obstacles: vec![sticky(slab()), sticky(slab())], ..boundary(9.0) };
         let [first, second] = shares(&twice, p, pushed);
@@ -548,12 +575,29 @@ mod tests {
     }
 
     #[test]
+    fn walls_that_rub_against_each_other_each_have_their_own() {
+        let mut boundary = boundary(1.0);
+        boundary.obstacles[1].surface_velocity = Some(Arc::new(|_, _| 5.0 * DVec3::Y));
+        let wall = Wall::new(WallKernel::WendlandC2, 1.0, 0.5);
+        let (p, velocity, viscosity) = (DVec3::new(0.4, 0.0, 2.0), 2.0 * DVec3::Y, 0.3);
+        let of = |k: usize| boundary.with_faces(&wall, p, Coverage::<WallDrag>::default(), k).friction;
+        let by_friction = of(0).rub(velocity, viscosity) + of(1).rub(velocity, viscosity);
+        let pushed = Pushed { by_friction, velocity, viscosity, ..Pushed::default() };
+        let [left, right] = shares(&boundary, p, pushed);
+        assert!(left.y < -0.5 && right.y > 0.5, "{left} {right}");
+        assert!((left - of(0).rub(velocity, viscosity)).length() < 1e-9, "{left}");
+        assert!((right - of(1).rub(velocity, viscosity)).length() < 1e-9, "{right}");
+    }
+
+    #[test]
     fn shares_add_up_to_the_whole() {
         let pushed = Pushed {
             by_pressure: DVec3::new(3.0, -2.0, 5.0),
             factor: -4.0,
             gradient: DVec3::new(0.3, -0.1, 0.0),
             by_friction: DVec3::new(-1.0, 7.0, 2.0),
+            velocity: DVec3::new(0.0, 3.0, -1.0),
+            viscosity: 0.2,
         };
         let [left, right] = shares(&boundary(1.2), DVec3::new(0.5, 0.0, 2.0), pushed);
         assert!((left + right - pushed.by_pressure - pushed.by_friction).length() < 1e-9, "{left} {right}");

@@ -307,7 +307,8 @@ impl<const LAMINAR: bool, const ARTIFICIAL: bool> PairPass<6, 10, 6> for Drag<'_
             let velocity = self.velocity.get(i);
             if let Some(reaction) = &self.reaction {
                 let by_friction = wall.friction.by_walls(drag, velocity, self.kinematic);
-                reaction.add(i, Pushed { by_friction, ..Pushed::default() });
+                let viscosity = self.kinematic;
+                reaction.add(i, Pushed { by_friction, velocity, viscosity, ..Pushed::default() });
             }
             drag = wall.friction.complete(drag, velocity, self.kinematic);
         }

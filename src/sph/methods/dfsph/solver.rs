@@ -1,6 +1,5 @@
 //! The solver of a linear system for s ≥ 0. There are two systems: one for velocities and one for places.
 
-use glam::DVec3;
 use rayon::prelude::*;
 
 use super::passes::{Constants, Continuation, Push, Squeeze};
@@ -272,7 +271,7 @@ impl Solver {
             let (push, factor) = (self.push.get(i), -2.0 * rest_density * self.s[i]);
             let of_pairs = completion.inverse() * push - factor * wall.gradient;
             let by_pressure = push - of_pairs;
-            let pushed = Pushed { by_pressure, factor, gradient: wall.gradient, by_friction: DVec3::ZERO };
+            let pushed = Pushed { by_pressure, factor, gradient: wall.gradient, ..Pushed::default() };
             reaction.add(i, pushed);
         });
     }

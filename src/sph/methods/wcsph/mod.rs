@@ -359,7 +359,7 @@ impl Numerics for Wcsph {
     fn noted(&self) -> Noted {
         match self.gradients() {
             Gradients::Pairs => Noted::Forces,
-            Gradients::Differences => Noted::Work,
+            Gradients::Differences => Noted::Friction,
         }
     }
 }

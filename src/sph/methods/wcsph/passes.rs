@@ -284,10 +284,19 @@ impl<const LAMINAR: bool, const ARTIFICIAL: bool, const EVEN: bool> Pairs<'_, LA
         if let Some(wall) = &wall {
             let pressure = rates.pressure[i];
             if let Some(reaction) = &rates.reaction {
-                let by_pressure = (push - by_pairs) / density;
                 let factor = -2.0 * pressure / density;
-                let by_friction = mean * by_friction;
-                reaction.add(i, Pushed { by_pressure, factor, gradient: wall.gradient, by_friction });
+                let pushed = Pushed {
+                    by_pressure: (push - by_pairs) / density,
+                    factor,
+                    gradient: wall.gradient,
+                    by_friction: mean * by_friction,
+                    velocity,
+                    viscosity: mean * laminar,
+                };
+                reaction.add(i, pushed);
+                if LAMINAR {
+                    reaction.note_drag(i, mean * drag);
+                }
             }
         }
         let acceleration = push / density + mean * drag + parameters.gravity;
