@@ -113,29 +113,56 @@ fn limit([coarse, middle, fine]: [f64; 3]) -> (f64, bool) {
 }
 
 /// The volume between a mesh and the surface, m³, negative where the mesh is outside: the integral of the
-/// distance, to first order ω/|∇ω|, over the triangles. Vertices lie on the surface, so the middles of the
-/// edges show what the curvature leaves out. A distance of more than a cell occurs only where the mesh is
-/// wrong, and is cut off at a cell. Faces on the border of the grid, where the solid is cut, are left out.
+/// height of the surface over the triangles. Vertices lie on the surface, so the middles of the edges show what the
+/// curvature leaves out. Faces on the border of the grid, where the solid is cut, are left out.
 fn beyond(field: &dyn Field, mesh: &Mesh, cell: f64) -> f64 {
-    let distance = |p: DVec3| {
-        let (omega, gradient) = field.omega_grad(p);
-        let distance = omega / gradient.length();
-        if distance.is_finite() { distance.clamp(-cell, cell) } else { 0.0 }
-    };
     let caps: FxHashSet<u32> = mesh.caps.iter().copied().collect();
     let of_triangle = |corners: &[u32; 3]| {
         if corners.iter().all(|corner| caps.contains(corner)) {
             return 0.0;
         }
         let [a, b, c] = corners.map(|corner| mesh.positions[corner as usize]);
-        let area = 0.5 * (b - a).cross(c - a).length();
+        let twice = (b - a).cross(c - a);
+        let (area, normal) = (0.5 * twice.length(), twice.normalize_or_zero());
         let middles = [(a, b), (b, c), (c, a)].map(|(p, q)| 0.5 * (p + q));
-        area / 3.0 * middles.into_iter().map(distance).sum::<f64>()
+        area / 3.0 * middles.into_iter().map(|p| height(field, p, normal, cell)).sum::<f64>()
     };
     // in parts of one size, so that the sum does not depend on the threads
     let parts = mesh.triangles.par_chunks(TRIANGLES_PER_PART);
     parts.map(|part| part.iter().map(of_triangle).sum::<f64>()).collect::<Vec<f64>>().into_iter().sum()
 }
+
+/// How far the surface is above a point of a triangle, at most a cell. To first order that is ω/|∇ω|, and ω has changed
+/// its sign well before only where another face than the triangle's decides ω at the point: the faces of a solid have
+/// scales of their own, and the one of the lowest value need not be the nearest. There the change of sign is sought
+/// along the triangle's normal. A height of more than a cell occurs only where the mesh is wrong, and is cut off.
+fn height(field: &dyn Field, p: DVec3, normal: DVec3, cell: f64) -> f64 {
+    let (omega, gradient) = field.omega_grad(p);
+    let first = omega / gradient.length();
+    if !first.is_finite() {
+        return 0.0;
+    }
+    let first = first.clamp(-cell, cell);
+    let is_beyond = |height: f64| (field.omega(p + height * normal) > 0.0) != (omega > 0.0);
+    if first.abs() <= NEGLIGIBLE * cell || !is_beyond(EARLY * first) {
+        return first;
+    }
+    let (mut near, mut far) = (0.0, EARLY * first);
+    for _ in 0..HALVED {
+        let middle = 0.5 * (near + far);
+        if is_beyond(middle) { far = middle } else { near = middle }
+    }
+    0.5 * (near + far)
+}
+
+/// Heights below this part of a cell are taken to first order.
+const NEGLIGIBLE: f64 = 1e-6;
+
+/// The part of a height of first order at which ω has its sign still, unless another face is nearer.
+const EARLY: f64 = 0.75;
+
+/// Bisections of a height.
+const HALVED: usize = 16;
 
 /// Triangles that a thread takes at a time.
 const TRIANGLES_PER_PART: usize = 4096;
@@ -172,6 +199,23 @@ mod tests {
         let area = 4.0 * std::f64::consts::PI;
         assert!((found.area - area).abs() < found.area_error && found.area_error < 0.02 * area, "{found:?}");
         assert_eq!((found.solids, found.solids_coarser), (1, 1));
+    }
+
+    #[test]
+    fn faces_with_different_scales_have_the_volume_of_the_solid_between_them() {
+        // near the rim the plane has the lower value although the ball is nearer
+        let half = Closures {
+            omega: |p: DVec3| (1000.0 * (1.0 - p.length_squared())).min(p.z - 0.1),
+            gradient: |p: DVec3| {
+                let is_plane = p.z - 0.1 < 1000.0 * (1.0 - p.length_squared());
+                if is_plane { DVec3::Z } else { -2000.0 * p }
+            },
+        };
+        let bounds = Aabb::new(DVec3::new(-1.0, -1.0, 0.1), DVec3::ONE);
+        let found = volume(&half, &bounds, 48, &Unwatched).unwrap();
+        let exact = std::f64::consts::PI * 0.9_f64.powi(2) * (3.0 - 0.9) / 3.0;
+        assert!((found.volume - exact).abs() < found.error, "{found:?} {exact}");
+        assert!(found.error < 1e-3 * exact, "{found:?}");
     }
 
     #[test]
