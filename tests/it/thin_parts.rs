@@ -32,13 +32,16 @@ fn turns(mesh: &Mesh, p: DVec3) -> f64 {
 
 #[test]
 fn tips_and_rims_of_what_the_grid_shows_are_told_from_thin_parts() {
-    // a tip between four faces, a rim of 23°, the horns of a crescent, a wedge of 11°, a cusp
+    // a tip between four faces, a rim of 23°, the horns of a crescent, a wedge of 11°, a cusp; rims of 27° in a ring that
+    // its sides cut off
     for text in [
         "abs(x)/2 + abs(y) + abs(z)/3 <= 1",
         "sphere(5).move([0, 0, -4.9]) and sphere(5).move([0, 0, 4.9])",
         "sphere(1) \\ sphere(1).move([0.2, 0, 0])",
         "box([0, 0, 0], [1, 1, 1]) and 5*z <= x",
         "4*(x^2 + y^2) <= (1 + z)*(1 - z)^3 and abs(z) <= 1",
+        "cylinder(26.5, 8).move([0, 0, -4]) \\ cylinder(23.5, 10).move([0, 0, -5]) \\ \
+         sphere(4.5).move([25, 0, 0]).polar_repeat(9)",
     ] {
         let (_, thin) = looked_at(&solid(text), 96);
         assert!(thin.count > 0 && thin.is_wedge && !thin.ended, "{text}: {thin:?}");

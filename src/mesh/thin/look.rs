@@ -48,6 +48,9 @@ const NARROWEST: f64 = 0.998;
 const FARTHER: f64 = 2.0;
 const STEPS_ALONG: u32 = 32;
 
+/// Steps along the edge of a wedge for each step away from it, in the order in which they are tried.
+const SIDEWAYS: [f64; 5] = [0.0, 1.0, -1.0, 3.0, -3.0];
+
 /// Greatest growth from one step to the next, and the thickness, in cells, from which growth is counted.
 const GROWTH: f64 = 2.0;
 const GROWTH_OF_CELL: f64 = 0.5;
@@ -184,6 +187,7 @@ impl Look<'_> {
         let is_opposed = opposed(&findings.proven);
         let boxes = if is_opposed { &findings.held } else { &findings.open };
         let mut normals: Normals = SmallVec::new();
+        let mut unmeasured = ThinCells::NONE;
         for part in boxes {
             for foot in self.feet(part) {
                 let is_known = is_known(foot.normal, &seen.around);
@@ -193,14 +197,18 @@ impl Look<'_> {
                     continue;
                 }
                 if !is_known || opposed(&normals) {
-                    let found = self.counted(foot, &seen);
-                    if found.count > 0 {
-                        return found;
+                    let counted = self.counted(foot, &seen);
+                    if counted.count > 0 && counted.thickness.is_finite() {
+                        return counted;
+                    }
+                    // the face at the end of a tip has nothing across, while those beside it may have
+                    if unmeasured.count == 0 {
+                        unmeasured = counted;
                     }
                 }
             }
         }
-        ThinCells::NONE
+        unmeasured
     }
 
     /// Whether the cell holds one face, or only faces that its own edges show. Most cells do, and need no look
@@ -362,18 +370,37 @@ impl Look<'_> {
     }
 
     /// Whether a part, or a gap, is the edge or the tip of something that the grid shows: between the faces that meet
-    /// there it grows to the thickness of two cells, and no other face comes in between.
+    /// there it grows to the thickness of two cells, and no other face comes in between. Where a third face cuts the
+    /// edge off, as at a corner, that may be so only on one side, so ways towards both ends of the edge are tried too.
     fn opens(&self, foot: &Foot, opposite: &Across, is_gap: bool) -> bool {
         let outwards = if is_gap { 1.0 } else { -1.0 };
         let faces = [foot.normal, opposite.normal];
         let cosine = -faces[0].dot(faces[1]);
-        let (Some(along), Some(across)) = (unit(outwards * (faces[0] + faces[1])), unit(faces[0] - faces[1]))
+        let (Some(steepest), Some(across)) =
+            (unit(outwards * (faces[0] + faces[1])), unit(faces[0] - faces[1]))
         else {
             return false; // a wall
         };
         if cosine >= NARROWEST {
             return false;
         }
+        let edge = steepest.cross(across);
+        SIDEWAYS
+            .into_iter()
+            .any(|sideways| self.opens_along(foot, opposite, steepest + sideways * edge, (across, is_gap)))
+    }
+
+    /// Whether it opens along one way: a step straight away from the edge, and one along it.
+    fn opens_along(
+        &self,
+        foot: &Foot,
+        opposite: &Across,
+        along: DVec3,
+        (across, is_gap): (DVec3, bool),
+    ) -> bool {
+        let outwards = if is_gap { 1.0 } else { -1.0 };
+        let faces = [foot.normal, opposite.normal];
+        let cosine = -faces[0].dot(faces[1]);
         let cell = self.bounds.size().max_element();
         // as far as plane faces at this angle are that thick, and as far again for curved ones
         let farthest = FARTHER * 0.5 * THICKEST * cell * ((1.0 + cosine) / (1.0 - cosine)).sqrt();
