@@ -1,11 +1,14 @@
 //! STL: triangles with their own normals in `f32`, as binary records or as text.
 //!
 //! Invariant: normals are computed from the triangles in `f64`, before corners are rounded, so slivers keep a
-//! direction. A triangle without area gets the zero normal, which readers take as "compute it".
+//! direction. A triangle without area gets the zero normal, which readers take as "compute it". Different vertices have
+//! different numbers, because readers know vertices by their numbers alone: a mesh that is closed and manifold is so in
+//! the file.
 
 use std::io::{self, Write};
 
 use glam::DVec3;
+use rustc_hash::FxHashMap;
 
 use super::super::{Mesh, normals::unit};
 use super::format::Format;
@@ -33,11 +36,12 @@ pub fn write(mesh: &Mesh, unit: LengthUnit, out: &mut dyn Write) -> io::Result<(
     out.write_all(&header)?;
     let count = u32::try_from(mesh.triangles.len()).map_err(io::Error::other)?;
     out.write_all(&count.to_le_bytes())?;
+    let places = places(mesh, unit);
     for triangle in &mesh.triangles {
         let mut record = [0; 50];
-        let numbers = facet(mesh, unit, *triangle).into_iter().flat_map(|v: DVec3| v.to_array());
+        let numbers = facet(mesh, &places, *triangle).into_iter().flatten();
         for (bytes, number) in record.chunks_exact_mut(4).zip(numbers) {
-            bytes.copy_from_slice(&(number as f32).to_le_bytes());
+            bytes.copy_from_slice(&number.to_le_bytes());
         }
         out.write_all(&record)?;
     }
@@ -50,11 +54,12 @@ pub fn write(mesh: &Mesh, unit: LengthUnit, out: &mut dyn Write) -> io::Result<(
 /// Those of the stream.
 pub fn write_ascii(mesh: &Mesh, unit: LengthUnit, out: &mut dyn Write) -> io::Result<()> {
     writeln!(out, "solid rfm")?;
+    let places = places(mesh, unit);
     for triangle in &mesh.triangles {
-        let [n, a, b, c] = facet(mesh, unit, *triangle).map(|v| v.as_vec3());
-        writeln!(out, "facet normal {:e} {:e} {:e}\nouter loop", n.x, n.y, n.z)?;
-        for p in [a, b, c] {
-            writeln!(out, "vertex {:e} {:e} {:e}", p.x, p.y, p.z)?;
+        let [[x, y, z], corners @ ..] = facet(mesh, &places, *triangle);
+        writeln!(out, "facet normal {x:e} {y:e} {z:e}\nouter loop")?;
+        for [x, y, z] in corners {
+            writeln!(out, "vertex {x:e} {y:e} {z:e}")?;
         }
         writeln!(out, "endloop\nendfacet")?;
     }
@@ -62,11 +67,52 @@ pub fn write_ascii(mesh: &Mesh, unit: LengthUnit, out: &mut dyn Write) -> io::Re
 }
 
 /// The normal and the corners of a triangle.
-fn facet(mesh: &Mesh, length: LengthUnit, triangle: [u32; 3]) -> [DVec3; 4] {
+fn facet(mesh: &Mesh, places: &[[f32; 3]], triangle: [u32; 3]) -> [[f32; 3]; 4] {
     let [a, b, c] = triangle.map(|v| mesh.positions[v as usize]);
     let normal = unit((b - a).cross(c - a)).unwrap_or(DVec3::ZERO);
-    let [a, b, c] = [a, b, c].map(|p| length.per_metre * p);
-    [normal, a, b, c]
+    let [a, b, c] = triangle.map(|v| places[v as usize]);
+    [normal.as_vec3().to_array(), a, b, c]
+}
+
+/// The vertices in single precision. One that falls onto an earlier one is put as few steps of the last digit away as
+/// are free, if it can be on the side on which it lies: triangles between the two then keep their directions.
+fn places(mesh: &Mesh, length: LengthUnit) -> Vec<[f32; 3]> {
+    let mut taken: FxHashMap<[u32; 3], usize> = FxHashMap::default();
+    let mut places = Vec::with_capacity(mesh.positions.len());
+    for (vertex, p) in mesh.positions.iter().enumerate() {
+        // −0 is 0 for readers that compare numbers, and not for those that compare bits
+        let rounded = (length.per_metre * *p).as_vec3().to_array().map(|c| c + 0.0);
+        let earlier = taken.get(&rounded.map(f32::to_bits)).map(|&earlier| mesh.positions[earlier]);
+        let place = match earlier.filter(|_| rounded.iter().all(|c| c.is_finite())) {
+            None => rounded,
+            Some(earlier) => {
+                let mut free = beside(rounded, *p - earlier);
+                free.find(|near| !taken.contains_key(&near.map(f32::to_bits))).unwrap_or(rounded)
+            }
+        };
+        taken.entry(place.map(f32::to_bits)).or_insert(vertex);
+        places.push(place);
+    }
+    places
+}
+
+/// The numbers near a place, the nearest ones first: a step of the last digit along the axis along which `towards` is
+/// longest, on its side, then along the others, then on the other side; then two steps, and so on. A step is that of the
+/// largest coordinate: smaller ones beside zero are lost in what readers do with them.
+fn beside(place: [f32; 3], towards: DVec3) -> impl Iterator<Item = [f32; 3]> {
+    let largest = place.iter().fold(0.0_f32, |largest, c| largest.max(c.abs())).max(f32::MIN_POSITIVE);
+    let mut axes = [0, 1, 2];
+    axes.sort_by(|&i, &j| towards[j].abs().total_cmp(&towards[i].abs()));
+    let own = towards.to_array().map(|c| if c < 0.0 { -1.0 } else { 1.0 });
+    (1_u8..=u8::MAX).flat_map(move |steps| {
+        [1.0, -1.0].into_iter().flat_map(move |side| {
+            axes.into_iter().map(move |axis| {
+                let mut near = place;
+                near[axis] += side * own[axis] * f32::from(steps) * (largest.next_up() - largest);
+                near
+            })
+        })
+    })
 }
 
 #[cfg(test)]
@@ -85,6 +131,30 @@ mod tests {
         write_ascii(&mesh, LengthUnit::METRE, &mut text).unwrap();
         assert!(text.starts_with(b"solid rfm\nfacet normal "));
         same_when_read(&mesh, text);
+    }
+
+    #[test]
+    fn vertices_that_fall_together_in_single_precision_stay_apart() {
+        // a tetrahedron two of whose corners differ in the ninth digit
+        let corners = [[10.0, 1.0, 0.0], [10.0, 1.0 + 1e-9, 0.0], [11.0, 1.0, 0.0], [10.0, 1.0, 1.0]];
+        let triangles = vec![[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]];
+        let mesh = Mesh::from_triangles(corners.map(DVec3::from_array).to_vec(), triangles);
+        // and one whose corners coincide altogether, but for the sign of a zero
+        let mut thin = mesh.clone();
+        thin.positions[1] = DVec3::new(10.0, 1.0, -0.0);
+        for (of, ascii) in [(&mesh, false), (&mesh, true), (&thin, false), (&thin, true)] {
+            let mut bytes = Vec::new();
+            let write = if ascii { write_ascii } else { write };
+            write(of, LengthUnit::MILLIMETRE, &mut bytes).unwrap();
+            let read = stl_io::read_stl(&mut std::io::Cursor::new(bytes)).unwrap();
+            assert_eq!(read.vertices.len(), 4);
+            assert!(
+                read.faces.iter().all(|f| f.vertices[0] != f.vertices[1] && f.vertices[1] != f.vertices[2])
+            );
+            if std::ptr::eq(of, &mesh) {
+                read.validate().unwrap(); // no triangle without area
+            }
+        }
     }
 
     fn same_when_read(mesh: &Mesh, bytes: Vec<u8>) {
