@@ -2,6 +2,8 @@
 
 use std::io::{self, Write};
 
+use glam::DVec3;
+
 use super::super::Mesh;
 use super::unit::LengthUnit;
 
@@ -26,6 +28,20 @@ pub struct Format {
 /// [`io::ErrorKind::InvalidInput`] for another unit than metres if the format has no other.
 pub type WriteMesh = fn(&Mesh, LengthUnit, &mut dyn Write) -> io::Result<()>;
 
+/// Coordinates below this part of the largest one are rounding, and zero.
+const ROUNDING: f64 = 1e-15;
+
+/// The vertices of a mesh in a unit, as text has them: what rounding has left of a zero is 0, without a sign.
+pub(super) fn places(mesh: &Mesh, unit: LengthUnit) -> impl Iterator<Item = DVec3> {
+    let largest = mesh.positions.iter().fold(0.0_f64, |most, p| most.max(p.abs().max_element()));
+    mesh.positions.iter().map(move |p| unit.per_metre * without_rounding(*p, largest))
+}
+
+/// A vector whose components are zero where they are rounding beside the largest one of its kind.
+pub(super) fn without_rounding(v: DVec3, largest: f64) -> DVec3 {
+    v.map(|c| if c.abs() < ROUNDING * largest { 0.0 } else { c + 0.0 })
+}
+
 /// Refuses another unit than metres for a format that knows no other.
 pub(super) fn in_metres(unit: LengthUnit) -> io::Result<()> {
     if unit == LengthUnit::METRE {
@@ -35,4 +51,19 @@ pub(super) fn in_metres(unit: LengthUnit) -> io::Result<()> {
         io::ErrorKind::InvalidInput,
         format!("the format is in metres, not in {}", unit.plural),
     ))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_rounding_leaves_of_zero_is_zero_in_every_text() {
+        let corners = vec![DVec3::new(0.03, -0.0, -5.4e-20), DVec3::new(0.0, 1e-12, 0.0), DVec3::X * 0.01];
+        let mesh = Mesh::from_triangles(corners, vec![[0, 1, 2]]);
+        let found: Vec<[String; 3]> =
+            places(&mesh, LengthUnit::MILLIMETRE).map(|p| p.to_array().map(|c| c.to_string())).collect();
+        // what is small and no rounding stays
+        assert_eq!(found, [["30", "0", "0"], ["0", "0.000000001", "0"], ["10", "0", "0"]]);
+    }
 }

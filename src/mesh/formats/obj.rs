@@ -6,13 +6,14 @@
 //! trimesh one of each normal unless `maintain_order` is set, and meshio refuses the file. PLY has one normal
 //! for a vertex, and is closed for all of them.
 //!
-//! Invariant: every number is written with the fewest digits that read back to the same `f64`.
+//! Invariant: every number is written with the fewest digits that read back to the same `f64`, but for what rounding has
+//! left of zeros.
 
 use std::io::{self, Write};
 
 use super::super::Mesh;
 use super::creases::split_creases;
-use super::format::Format;
+use super::format::{Format, places, without_rounding};
 use super::unit::LengthUnit;
 
 /// The entry of the table of formats.
@@ -31,11 +32,11 @@ pub const FORMAT: Format = Format {
 /// Those of the stream.
 pub fn write(mesh: &Mesh, unit: LengthUnit, out: &mut dyn Write) -> io::Result<()> {
     writeln!(out, "# rfm, {}, outward normals", unit.plural)?;
-    for p in mesh.positions.iter().map(|p| unit.per_metre * p) {
+    for p in places(mesh, unit) {
         writeln!(out, "v {} {} {}", p.x, p.y, p.z)?;
     }
     let split = split_creases(mesh);
-    for n in &split.normals {
+    for n in split.normals.iter().map(|n| without_rounding(*n, 1.0)) {
         writeln!(out, "vn {} {} {}", n.x, n.y, n.z)?;
     }
     for (places, normals) in mesh.triangles.iter().zip(&split.triangles) {
@@ -80,15 +81,15 @@ mod tests {
         // the reader numbers vertices in the order of faces
         let corner = |flat: &[f64], index: u32| DVec3::from_slice(&flat[3 * index as usize..]);
         assert_eq!(model.mesh.indices.len(), 3 * mesh.triangles.len());
+        let written: Vec<DVec3> = places(&mesh, LengthUnit::METRE).collect();
+        assert!(written.iter().zip(&mesh.positions).all(|(p, q)| p.distance(*q) < 1e-14));
         let split = split_creases(&mesh);
         assert!(split.normals.len() > mesh.normals.len(), "the pawn has creases");
         for (i, v) in mesh.triangles.iter().flatten().enumerate() {
             let (place, normal) = (model.mesh.indices[i], model.mesh.normal_indices[i]);
-            assert_eq!(corner(&model.mesh.positions, place), mesh.positions[*v as usize]);
-            assert_eq!(
-                corner(&model.mesh.normals, normal),
-                split.normals[split.triangles[i / 3][i % 3] as usize]
-            );
+            assert_eq!(corner(&model.mesh.positions, place), written[*v as usize]);
+            let own = split.normals[split.triangles[i / 3][i % 3] as usize];
+            assert_eq!(corner(&model.mesh.normals, normal), without_rounding(own, 1.0));
         }
     }
 }

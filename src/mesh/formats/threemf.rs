@@ -1,14 +1,14 @@
 //! 3MF, for printers: a zip archive with the triangles as XML, which states their unit.
 //!
-//! Invariant: every number is written with the fewest digits that read back to the same `f64`. Equal meshes
-//! give equal bytes, because the archive holds no date.
+//! Invariant: every number is written with the fewest digits that read back to the same `f64`, but for what rounding has
+//! left of zeros. Equal meshes give equal bytes, because the archive holds no date.
 
 use std::io::{self, Cursor, Write};
 
 use zip::{CompressionMethod, ZipWriter, write::SimpleFileOptions};
 
 use super::super::Mesh;
-use super::format::Format;
+use super::format::{Format, places};
 use super::unit::LengthUnit;
 
 const CONTENT_TYPES: &str = r#"<?xml version="1.0" encoding="UTF-8"?>
@@ -52,7 +52,7 @@ fn model(mesh: &Mesh, unit: LengthUnit, out: &mut impl Write) -> io::Result<()> 
     let is_empty = mesh.triangles.is_empty();
     if !is_empty {
         writeln!(out, r#"<object id="1" type="model"><mesh><vertices>"#)?;
-        for p in mesh.positions.iter().map(|p| unit.per_metre * p) {
+        for p in places(mesh, unit) {
             writeln!(out, r#"<vertex x="{}" y="{}" z="{}"/>"#, p.x, p.y, p.z)?;
         }
         writeln!(out, "</vertices><triangles>")?;
@@ -101,7 +101,7 @@ mod tests {
         };
         let model_name = ("http://schemas.microsoft.com/3dmanufacturing/core/2015/02", "model");
         assert!(model.root_element().has_tag_name(model_name));
-        let positions: Vec<[f64; 3]> = mesh.positions.iter().map(|p| p.to_array()).collect();
+        let positions: Vec<[f64; 3]> = places(&mesh, LengthUnit::METRE).map(|p| p.to_array()).collect();
         assert_eq!(rows("vertex", ["x", "y", "z"]), positions);
         let triangles: Vec<[f64; 3]> = mesh.triangles.iter().map(|t| t.map(f64::from)).collect();
         assert_eq!(rows("triangle", ["v1", "v2", "v3"]), triangles);
