@@ -45,11 +45,16 @@ fn the_measured_error_is_within_the_one_asked_for() {
 
 #[test]
 fn an_error_that_the_mesh_itself_exceeds_is_admitted() {
-    let flags = ["mesh", "examples/pawn.rfm", "--cells", "32", "--simplify", "0.1mm", "--json"];
-    let outcome = rfm(root(), &flags).expect(0);
-    assert!(outcome.stderr.contains("--method dc"), "{}", outcome.stderr);
-    let found = outcome.json();
-    assert!(number(&found, "simplify_error") > 1e-4 && found["closed"] == true, "{found}");
+    for (method, helps) in [("mc", true), ("dc", false)] {
+        let flags = ["mesh", "examples/pawn.rfm", "--cells", "32", "--simplify", "0.1mm", "--json"];
+        let outcome = rfm(root(), &[&flags[..], &["--method", method]].concat()).expect(0);
+        // nobody is told to use the method that they use
+        assert_eq!(outcome.stderr.contains("--method dc"), helps, "{}", outcome.stderr);
+        assert!(outcome.stderr.contains("so all triangles are kept"), "{}", outcome.stderr);
+        let found = outcome.json();
+        assert!(number(&found, "simplify_error") > 1e-4 && found["closed"] == true, "{found}");
+        assert_eq!(found["triangles"], found["simplified_from"], "{found}");
+    }
     // there is nothing to simplify and nothing to measure
     let empty = b"rfm 1\nsolid s = sphere(1) and sphere(1).move([3, 0, 0])";
     let outcome = rfm_reading(root(), &["mesh", "-", "--simplify", "1%", "--json"], empty).expect(1);

@@ -275,17 +275,17 @@ fn measured(
     let reference = Reference::new(surface, &depth, grid);
     spinner.finish_and_clear();
     let reference = reference.map_err(Failure::usage)?;
-    let found = options.simplify.map(|tolerance| simplified(mesh, tolerance, &depth, &reference));
-    let quality = match &found {
-        Some(found) => found.quality,
-        None => {
+    let found =
+        options.simplify.map(|tolerance| simplified(mesh, tolerance, &depth, &reference, options.method));
+    let quality = options.quality.then(|| {
+        found.as_ref().and_then(|found| found.quality).unwrap_or_else(|| {
             let spinner = progress::spinner("measuring");
             let quality = reference.measure(mesh);
             spinner.finish_and_clear();
             quality
-        }
-    };
-    Ok((options.quality.then_some(quality), found))
+        })
+    });
+    Ok((quality, found))
 }
 
 /// The parts that a grid cannot show, as a sentence without its subject: how much, where, and how many cells

@@ -3,6 +3,7 @@
 
 use std::time::Instant;
 
+use super::super::args::MeshMethod;
 use super::super::failure::note;
 use super::super::progress;
 use super::super::values::Tolerance;
@@ -13,7 +14,10 @@ use rfm::mesh::{Mesh, Quality, Reference, simplify};
 
 /// What was found about a simplified mesh.
 pub(super) struct Simplified {
-    pub quality: Quality,
+    /// `None` if it was plain at once that the tolerance cannot be kept: the mesh is what it was.
+    pub quality: Option<Quality>,
+    /// The distance from the surface in metres, or what it is at least if there is no quality.
+    pub error: f64,
     /// The number of triangles before.
     pub from: usize,
     /// In metres.
@@ -22,6 +26,12 @@ pub(super) struct Simplified {
     pub simplifying: f64,
     /// The time to measure what came of it.
     pub measuring: f64,
+}
+
+impl Simplified {
+    fn new(quality: Quality, (from, tolerance): (usize, f64), (simplifying, measuring): (f64, f64)) -> Self {
+        Self { quality: Some(quality), error: quality.hausdorff(), from, tolerance, simplifying, measuring }
+    }
 }
 
 impl Tolerance {
@@ -50,6 +60,7 @@ pub(super) fn simplified(
     tolerance: Tolerance,
     distance: &dyn Field,
     reference: &Reference<'_>,
+    method: MeshMethod,
 ) -> Simplified {
     let tolerance = tolerance.of(mesh);
     let bounds = mesh.positions.iter().fold(Aabb::EMPTY, |bounds, p| bounds.including(*p));
@@ -60,7 +71,22 @@ pub(super) fn simplified(
         ));
     }
     let from = mesh.triangles.len();
-    let (mut simplifying, mut measuring) = (0.0, 0.0);
+    let advice = match method {
+        MeshMethod::Mc => "try more cells, or --method dc for sharp edges",
+        MeshMethod::Dc => "try more cells",
+    };
+    // most of the time goes into contracting edges and measuring what comes of it
+    let started = Instant::now();
+    let least = reference.least_distance(mesh);
+    if least > tolerance {
+        note(format!(
+            "the mesh is {least:.2e} m from the surface as it is, more than the {tolerance:.2e} m asked for, so all \
+             triangles are kept; {advice}"
+        ));
+        let measuring = milliseconds(started);
+        return Simplified { quality: None, error: least, from, tolerance, simplifying: 0.0, measuring };
+    }
+    let (mut simplifying, mut measuring) = (0.0, milliseconds(started));
     let measure = |mesh: &Mesh, time: &mut f64| {
         let (started, bar) = (Instant::now(), progress::spinner("measuring"));
         let quality = reference.measure(mesh);
@@ -78,20 +104,20 @@ pub(super) fn simplified(
         let quality = measure(&less, &mut measuring);
         if quality.hausdorff() <= tolerance {
             *mesh = less;
-            return Simplified { quality, from, tolerance, simplifying, measuring };
+            return Simplified::new(quality, (from, tolerance), (simplifying, measuring));
         }
         let own: &Quality = own.get_or_insert_with(|| measure(mesh, &mut measuring));
         if own.hausdorff() > tolerance {
             note(format!(
                 "before it is simplified the mesh is already {:.2e} m from the surface, more than the \
-                 {tolerance:.2e} m asked for; try more cells, or --method dc for sharp edges if it was made by mc",
+                 {tolerance:.2e} m asked for; {advice}",
                 own.hausdorff()
             ));
             *mesh = less;
-            return Simplified { quality, from, tolerance, simplifying, measuring };
+            return Simplified::new(quality, (from, tolerance), (simplifying, measuring));
         }
     }
     note("no simplified mesh was found to be near enough to the surface: all triangles are kept");
     let quality = own.unwrap_or_else(|| measure(mesh, &mut measuring));
-    Simplified { quality, from, tolerance, simplifying, measuring }
+    Simplified::new(quality, (from, tolerance), (simplifying, measuring))
 }

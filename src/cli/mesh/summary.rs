@@ -62,10 +62,14 @@ struct SimplifiedFigures {
     simplified_from: usize,
     /// In metres, as asked for.
     simplify_tolerance: f64,
-    /// The measured Hausdorff distance from the surface, in metres.
+    /// The measured Hausdorff distance from the surface, in metres; at least that much if the mesh could not be
+    /// simplified because it was already farther away than the tolerance.
     simplify_error: f64,
     /// The time to simplify and to measure.
     simplify_milliseconds: f64,
+    /// Whether it was plain at once that the tolerance cannot be kept.
+    #[serde(skip)]
+    is_hopeless: bool,
     #[serde(skip)]
     simplifying: f64,
     #[serde(skip)]
@@ -77,8 +81,9 @@ impl From<&Simplified> for SimplifiedFigures {
         Self {
             simplified_from: simplified.from,
             simplify_tolerance: simplified.tolerance,
-            simplify_error: simplified.quality.hausdorff(),
+            simplify_error: simplified.error,
             simplify_milliseconds: simplified.simplifying + simplified.measuring,
+            is_hopeless: simplified.quality.is_none(),
             simplifying: simplified.simplifying,
             measuring: simplified.measuring,
         }
@@ -147,7 +152,13 @@ impl MeshSummary {
             self.max_distance,
             self.rms_distance
         );
-        if let Some(simplified) = &self.simplified {
+        if let Some(kept) = self.simplified.as_ref().filter(|simplified| simplified.is_hopeless) {
+            say!(
+                "not simplified: at least {:.2e} from the surface as it is, {:.2e} allowed",
+                kept.simplify_error,
+                kept.simplify_tolerance
+            );
+        } else if let Some(simplified) = &self.simplified {
             say!(
                 "simplified from {} triangles in {:.1} ms: at most {:.2e} from the surface, as measured in {:.1} ms, {:.2e} \
                  allowed",
