@@ -315,7 +315,7 @@ fn remark(solid: &Solid, mesh: &Mesh, (thin, grid): (&ThinCells, Option<&Grid>),
         let what = if thin.is_wedge {
             "the mesh shows sharp edges and tips blunt"
         } else {
-            "the mesh misses what is thinner than a cell"
+            "the mesh does not show all of what is thinner than two cells:"
         };
         note(format!("{what} {}", hidden(thin, grid)));
     }
