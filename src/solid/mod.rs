@@ -13,6 +13,7 @@
 //! | `path` | where a straight path meets a solid |
 //! | `cells` | boxes divided into cells, for solids at rest and for solids that move |
 //! | `lints` | what in a solid is most likely not meant |
+//! | `triangles` | the surface of a solid that is a mesh alone |
 //! | `bounds`, `tolerance`, `inspection` | its extent, its certified errors, its leaves for people |
 //!
 //! Invariant: a [`Solid`] answers for every point, every engine gives the same bits, and a program is
@@ -33,6 +34,7 @@ mod path;
 mod programs;
 mod surface;
 mod tolerance;
+mod triangles;
 mod twin;
 mod walls;
 

@@ -207,6 +207,10 @@ impl Table for TriangleSolid {
         bounds.grown(slack - least)
     }
 
+    fn triangles(&self) -> Option<(Vec<DVec3>, Vec<[u32; 3]>)> {
+        Some(self.surface.parts())
+    }
+
     fn what(&self) -> &'static str {
         "a mesh"
     }

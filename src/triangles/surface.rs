@@ -228,6 +228,11 @@ impl Surface {
         &self.space
     }
 
+    /// All corners, and the numbers of those of each triangle.
+    pub fn parts(&self) -> (Vec<DVec3>, Vec<[u32; 3]>) {
+        (self.places.clone(), self.triangles.clone())
+    }
+
     pub fn corners_of(&self, triangle: u32) -> [DVec3; 3] {
         self.triangles[triangle as usize].map(|i| self.places[i as usize])
     }

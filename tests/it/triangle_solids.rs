@@ -151,6 +151,40 @@ fn a_unit_scales_the_solid() {
 
 /// Machine code, for points and columns, in both precisions, has the bits of the interpreter.
 #[test]
+fn a_mesh_that_is_moved_alone_keeps_its_triangles() {
+    let soup = pawn(16);
+    let volume_and_area = |text: &str| {
+        let solid = program(&format!("solid s = {text}"), binary_stl(&soup)).solid("s").unwrap();
+        solid.triangles().map(|(places, triangles)| {
+            let shells = rfm::mesh::shells(&rfm::mesh::Mesh::from_triangles(places.clone(), triangles));
+            // they are the surface of the solid where it is
+            let bounds = solid.bounds().aabb().unwrap();
+            assert!(
+                places.iter().all(|p| bounds.grown(1e-9).contains(*p) && solid.omega(*p).abs() < 1e-9),
+                "{text}"
+            );
+            shells.iter().fold([0.0; 2], |[v, a], shell| [v + shell.volume, a + shell.area])
+        })
+    };
+    let [volume, area] = volume_and_area("mesh(\"p.stl\")").unwrap();
+    assert!(volume > 0.0);
+    for (change, factor) in [
+        (".rotate_z(30 deg).move([0.1, 0.2, 0.3])", 1.0_f64),
+        (".scale(3).rotate([1, 2, 3], 0.7, [0, 0, 1])", 3.0),
+        (".mirror([1, 1, 0])", 1.0),
+        (".move([sin(t), 0, 0]).rotate_x(t)", 1.0),
+    ] {
+        let [moved, its_area] = volume_and_area(&format!("mesh(\"p.stl\"){change}")).unwrap();
+        assert!((moved / (factor.powi(3) * volume) - 1.0).abs() < 1e-12, "{change}: {moved} {volume}");
+        assert!((its_area / (factor.powi(2) * area) - 1.0).abs() < 1e-12, "{change}: {its_area} {area}");
+    }
+    for other in ["mesh(\"p.stl\").offset(0.01)", "mesh(\"p.stl\") and z <= 0.1", "mesh(\"p.stl\").turned(z)"]
+    {
+        assert_eq!(volume_and_area(other), None, "{other}");
+    }
+}
+
+#[test]
 fn programs_are_the_interpreter() {
     let program =
         program(&format!("{HOLES}\nsolid turned = part.rotate_x(20 deg).twist(0.1)"), binary_stl(&pawn(16)));
