@@ -88,8 +88,15 @@ fn a_check_ends_early_with_what_it_has() {
     };
     let (found, said) = measured(5000);
     assert!((1..5000).contains(&found), "{found}");
-    assert!(said.contains(&format!("{found} of 5000 solids were measured in ")), "{said}");
-    assert!(said.contains("--budget SECONDS gives more time than 1 s"), "{said}");
+    assert!(
+        said.contains(&format!("{found} of 5000 solids were measured, for the budget of 1 s ")),
+        "{said}"
+    );
+    let (next, more) = (found + 1, 5000 - found - 5);
+    assert!(
+        said.contains(&format!("left out: `ball{next}`, ")) && said.contains(&format!(" and {more} more")),
+        "{said}"
+    );
     assert_eq!(measured(2), (2, String::new()));
 }
 

@@ -242,6 +242,24 @@ fn check_as_json() {
     assert!(message["message"].as_str().unwrap().contains("spere"));
 }
 
+/// A solid with walls of one and a half cells is measured with the cells that it needs, and a slow solid leaves the
+/// others their share of the time.
+#[test]
+fn a_check_gives_each_solid_the_cells_and_the_time_that_it_needs() {
+    let text = b"rfm 1\nsolid slow = (noise(40*[x, y, z]) or noise(200*[x, y, z])) and box()\n\
+        solid shell = sphere(1) \\ sphere(0.97)\nsolid ball = sphere(1)";
+    let outcome = rfm_reading(root(), &["check", "--json", "--budget", "8", "-"], text).expect(0);
+    let document = outcome.json();
+    let of_unit = 4.0 / 3.0 * std::f64::consts::PI;
+    for (number, volume, is_fine) in [(1, of_unit * (1.0 - 0.97_f64.powi(3)), true), (2, of_unit, false)] {
+        let solid = &document["solids"][number];
+        assert!((solid["volume"].as_f64().unwrap() / volume - 1.0).abs() < 1e-6, "{solid}");
+        assert_eq!(solid["resolved"], true, "{solid}");
+        assert_eq!(solid["cells"].as_u64().unwrap() > 96, is_fine, "{solid}");
+    }
+    assert_eq!(document["solids"][0]["name"], "slow");
+}
+
 #[test]
 fn what_is_not_finished_in_the_time_for_it_is_said() {
     // details in every cell: minutes of work

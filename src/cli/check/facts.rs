@@ -41,6 +41,9 @@ pub(super) struct Facts {
     pub time: Option<f64>,
     /// The number of cells of the finer grid in which parts of the surface hide, see `mesh::thin_cells`.
     pub thin_cells: Option<usize>,
+    /// The cells along the longest side of the finest grid that the volume and the area were measured on: more than
+    /// the usual ones where the solid is too thin for these. Null if there was no need of a grid.
+    pub cells: Option<usize>,
     /// What was not finished within the budget: `volume` (and area), `thin_cells`.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub unfinished: Vec<&'static str>,
@@ -73,6 +76,7 @@ impl Facts {
             error_bound: None,
             time: solid.moves().then(|| solid.time()),
             thin_cells: None,
+            cells: Some(VOLUME_CELLS),
             unfinished: Vec::new(),
             components_coarser: None,
             no_volume: None,
@@ -153,13 +157,20 @@ fn print_solid(solid: &Facts) {
     if let (Some(components), Some(coarser), false) =
         (solid.components, solid.components_coarser, solid.empty)
     {
-        let half = VOLUME_CELLS / 2;
+        let cells = solid.cells.unwrap_or(VOLUME_CELLS);
+        let half = cells / 2;
         match coarser == components {
             true => say!("    components  {components}"),
-            false => say!(
-                "    components  {components}, but {coarser} with {half} cells instead of {VOLUME_CELLS}"
-            ),
+            false => say!("    components  {components}, but {coarser} with {half} cells instead of {cells}"),
         }
+    }
+    match solid.cells {
+        Some(cells) if cells > VOLUME_CELLS => {
+            say!("    measured    with {cells} cells along its longest side")
+        }
+        Some(_) => {}
+        None if !solid.empty => say!("    measured    exactly: the sums over the triangles of its mesh"),
+        None => {}
     }
     if solid.resolved == Some(false) {
         say!("    not resolved: volume, area and components are those of what {VOLUME_CELLS} cells show");

@@ -2,13 +2,13 @@
 
 use super::facts::{Box3, Facts, RESOLUTION, VOLUME_CELLS};
 use crate::cli::deadline::Deadline;
-use crate::cli::failure::{Failure, note};
+use crate::cli::failure::Failure;
 use rfm::Solid;
 use rfm::field::Field;
 use rfm::geom::{Aabb, to_thousandths};
 use rfm::glam::DVec3;
 use rfm::interval::Interval;
-use rfm::mesh::{self, Grid, MeshError, ThinCells, VolumeError};
+use rfm::mesh::{self, Grid, Mesh, MeshError, Resolution, ThinCells, Volume, VolumeError};
 use rfm::solid::Bounds;
 
 /// Boxes along each side of a solid in which its range is tried; one in `MOST_UNKNOWN` of them may be
@@ -16,8 +16,21 @@ use rfm::solid::Bounds;
 const PROBES: u32 = 16;
 const MOST_UNKNOWN: usize = 50;
 
-/// What is known of a solid, and what its meshes miss. At the deadline it ends with what was found until then.
-pub(super) fn measure(solid: &Solid, file: &str, deadline: &Deadline) -> Result<(Facts, ThinCells), Failure> {
+/// The most cells that a solid is measured with that is too thin for the usual ones, and how often it gets more.
+const MOST_CELLS: usize = 512;
+const REFINED: usize = 3;
+
+/// What rounding may add to the sums over triangles, relative to them.
+const ROUNDING: f64 = 1e-12;
+
+/// What is known of a solid, what its meshes miss, and what is to be said about the search. At the deadline it ends
+/// with what was found until then.
+pub(super) fn measure(
+    solid: &Solid,
+    file: &str,
+    deadline: &Deadline,
+    notes: &mut Vec<String>,
+) -> Result<(Facts, ThinCells), Failure> {
     let mut facts = Facts::unknown(solid, file);
     let bounds = match solid.bounds() {
         Bounds::Within(bounds) => bounds,
@@ -33,6 +46,7 @@ pub(super) fn measure(solid: &Solid, file: &str, deadline: &Deadline) -> Result<
                 components: Some(0),
                 resolved: Some(true),
                 thin_cells: Some(0),
+                cells: None,
                 ..facts
             };
             return Ok((facts, ThinCells::NONE));
@@ -50,15 +64,14 @@ pub(super) fn measure(solid: &Solid, file: &str, deadline: &Deadline) -> Result<
         }
     };
     let mut shows_nothing = false;
+    if let Some((places, triangles)) = solid.triangles() {
+        let thin = thin_cells(solid, &*surface, &grid, deadline, notes);
+        tell_of_end(solid, thin, &mut facts, notes);
+        exact(&Mesh::from_triangles(places, triangles), &mut facts);
+        return Ok((facts, thin.unwrap_or(ThinCells::NONE)));
+    }
     match mesh::volume(&*surface, bounds, VOLUME_CELLS, deadline) {
-        Ok(found) => {
-            facts.volume = Some(found.volume);
-            facts.volume_error = Some(found.error);
-            facts.area = Some(found.area);
-            facts.area_error = Some(found.area_error);
-            facts.components = Some(found.solids);
-            facts.components_coarser = Some(found.solids_coarser);
-        }
+        Ok(found) => take(&found, &mut facts),
         Err(VolumeError::TooThin) => {
             facts.no_volume =
                 Some(format!("it is empty, or too thin for {VOLUME_CELLS} cells along its longest side"));
@@ -77,31 +90,106 @@ pub(super) fn measure(solid: &Solid, file: &str, deadline: &Deadline) -> Result<
             return Ok((facts, ThinCells::NONE));
         }
     }
-    let thin = thin_cells(solid, &*surface, &grid, deadline);
-    if thin.is_some_and(|thin| thin.ended) {
-        facts.unfinished.push("thin_cells");
-        note(format!(
-            "the search for thin parts of `{}` was ended before all of its surface was looked at; --budget gives it \
-             more time",
-            solid.name()
-        ));
-    }
+    let thin = thin_cells(solid, &*surface, &grid, deadline, notes);
+    tell_of_end(solid, thin, &mut facts, notes);
     if let (Some(solids), Some(coarser)) = (facts.components, facts.components_coarser) {
         // what is left out at the edge of a wedge is within the errors
         let no_thin_parts = thin.is_some_and(|thin| thin.count == 0 || thin.is_wedge);
         let is_known = solids != coarser || !no_thin_parts || thin.is_some_and(|thin| !thin.ended);
         facts.resolved = is_known.then_some(solids == coarser && no_thin_parts);
     }
+    if let Some(thin) = thin.filter(|_| facts.resolved == Some(false)) {
+        refine((solid, &*surface, bounds), (&grid, thin), deadline, (&mut facts, notes));
+    }
     // a part thinner than a cell would have been found
     facts.shows_nothing = shows_nothing && thin.is_some_and(|thin| thin.count == 0 && !thin.ended);
-    facts.thin_cells = thin.filter(|thin| !thin.ended).map(|thin| thin.count);
     Ok((facts, thin.unwrap_or(ThinCells::NONE)))
 }
 
+/// The figures of meshes.
+fn take(found: &Volume, facts: &mut Facts) {
+    facts.volume = Some(found.volume);
+    facts.volume_error = Some(found.error);
+    facts.area = Some(found.area);
+    facts.area_error = Some(found.area_error);
+    facts.components = Some(found.solids);
+    facts.components_coarser = Some(found.solids_coarser);
+}
+
+/// The figures of a solid whose surface is a list of triangles.
+fn exact(mesh: &Mesh, facts: &mut Facts) {
+    let shells = mesh::shells(mesh);
+    let volume = shells.iter().map(|shell| shell.volume).sum::<f64>();
+    let area = shells.iter().map(|shell| shell.area).sum::<f64>();
+    let components = shells.iter().filter(|shell| shell.is_solid()).count();
+    facts.volume = Some(volume);
+    facts.volume_error = Some(ROUNDING * volume);
+    facts.area = Some(area);
+    facts.area_error = Some(ROUNDING * area);
+    facts.components = Some(components);
+    facts.components_coarser = Some(components);
+    facts.resolved = Some(true);
+    facts.cells = None;
+}
+
+/// Says that the search for thin parts was ended, or how many cells hide some.
+fn tell_of_end(solid: &Solid, thin: Option<ThinCells>, facts: &mut Facts, notes: &mut Vec<String>) {
+    if thin.is_some_and(|thin| thin.ended) {
+        facts.unfinished.push("thin_cells");
+        notes.push(format!(
+            "the search for thin parts of `{}` was ended before all of its surface was looked at; --budget gives it \
+             more time",
+            solid.name()
+        ));
+    }
+    facts.thin_cells = thin.filter(|thin| !thin.ended).map(|thin| thin.count);
+}
+
+/// Measures a solid again with the cells that its thin parts need. If these show all of it, their figures are taken.
+fn refine(
+    (solid, surface, bounds): (&Solid, &dyn Field, &Aabb),
+    (grid, thin): (&Grid, ThinCells),
+    deadline: &Deadline,
+    (facts, notes): (&mut Facts, &mut Vec<String>),
+) {
+    let mut needed = thin.cells_needed(grid);
+    for _ in 0..REFINED {
+        let Some(cells) = needed.filter(|&cells| cells > VOLUME_CELLS && cells <= MOST_CELLS) else { return };
+        let Ok(grid) = Grid::around(bounds, Resolution::Cells(cells)) else { return };
+        let thin = mesh::thin_cells(surface, &grid, deadline).ok().filter(|thin| !thin.ended);
+        let is_shown = thin.is_some_and(|thin| thin.count == 0 || thin.is_wedge);
+        if thin.is_some() && !is_shown {
+            let more = thin.and_then(|thin| thin.cells_needed(&grid)).unwrap_or(0);
+            // where it is thinnest elsewhere, or in steps where the same place needs a little more
+            needed = Some(more.max(cells + cells / 4));
+            continue;
+        }
+        match mesh::volume(surface, bounds, cells, deadline).ok().filter(|_| is_shown) {
+            Some(found) if found.solids == found.solids_coarser => {
+                take(&found, facts);
+                facts.resolved = Some(true);
+                facts.cells = Some(cells);
+            }
+            Some(_) => {}
+            None => notes.push(format!(
+                "there was no time to measure `{}` with the {cells} cells that show its thin parts; --budget gives it more",
+                solid.name()
+            )),
+        }
+        return;
+    }
+}
+
 /// What the finest mesh misses; `None` if the formula does not let it be found.
-fn thin_cells(solid: &Solid, surface: &dyn Field, grid: &Grid, deadline: &Deadline) -> Option<ThinCells> {
+fn thin_cells(
+    solid: &Solid,
+    surface: &dyn Field,
+    grid: &Grid,
+    deadline: &Deadline,
+    notes: &mut Vec<String>,
+) -> Option<ThinCells> {
     if !knows_ranges(solid, grid.bounds()) {
-        note(format!(
+        notes.push(format!(
             "thin parts of `{}` are not looked for: the ranges of its formula are unknown",
             solid.name()
         ));

@@ -183,10 +183,7 @@ fn solids(
     options: &Check,
     diagnostics: &mut Diagnostics,
 ) -> Result<Vec<Facts>, Failure> {
-    let (time, budget) = (options.time, options.budget);
-    let deadline = Deadline::after(budget);
-    let (mut facts, mut searches) = (Vec::new(), lints::Searches::new());
-    let (start, all) = (Instant::now(), &program.module().solids);
+    let (start, budget, all) = (Instant::now(), options.budget, &program.module().solids);
     let chosen = |name: &String| {
         let found = all.iter().find(|named| named.name == *name);
         found.ok_or_else(|| choose::no_such(Path::new(file), program, name))
@@ -195,50 +192,140 @@ fn solids(
         [] => all.iter().collect(),
         names => names.iter().map(chosen).collect::<Result<_, _>>()?,
     };
-    for &named in &named_solids {
+    let mut tried: Vec<Tried<'_>> = Vec::new();
+    for (number, &named) in named_solids.iter().enumerate() {
         let elapsed = start.elapsed().as_secs_f64();
-        if is_over(facts.len(), named_solids.len(), elapsed, budget) {
-            note(format!(
-                "{} of {} solids were measured in {elapsed:.1} s; --budget SECONDS gives more time than {budget} s",
-                facts.len(),
-                named_solids.len()
-            ));
+        if is_over(number, named_solids.len(), elapsed, budget) {
+            note(left_out(&named_solids, number, elapsed, budget));
             break;
         }
-        let solid = program.solid_with(&named.name, shared.engine.into()).map_err(choose::usage)?.at(time);
-        let operations = solid.graph(ProgramKind::Value).0.len();
-        if let Some(why) = too_long(&solid, operations, budget) {
-            note(format!("solid `{}` has {operations} operations: {why}", named.name));
-            let tolerance = program.tolerance(&named.name).map(|tolerance| tolerance.value);
-            let bounds = solid.bounds().aabb().map(|bounds| Box3::of(&bounds));
-            let empty = *solid.bounds() == Bounds::Empty;
-            let unknown = Facts::unknown(&solid, file);
-            facts.push(Facts { tolerance, bounds, empty, ..unknown });
-            continue;
-        }
-        let (mut found, thin) = measure(&solid, file, &deadline)?;
-        diagnostics.list.extend(overflow(program, named, &solid));
-        found.tolerance = program.tolerance(&named.name).map(|tolerance| tolerance.value);
-        match program.within_tolerance(&solid) {
-            Some(Ok(chosen)) => {
-                found.program = Some(chosen.variant().name());
-                found.error_bound = Some(chosen.bound());
-            }
-            Some(Err(diagnostic)) => diagnostics.list.push(*diagnostic),
-            None => {}
-        }
-        diagnostics.list.extend(remarks(program, named, &solid, &thin));
-        if found.shows_nothing {
-            diagnostics.list.push(may_be_empty(named));
-        }
-        diagnostics.list.extend(lints::of_solid(program, named, &solid, &mut searches));
-        facts.push(found);
+        let solid = program.solid_with(&named.name, shared.engine.into()).map_err(choose::usage)?;
+        let seconds = share(budget - elapsed, named_solids.len() - number, budget);
+        tried.push(Tried::new((named, solid.at(options.time)), file, seconds, budget)?);
+    }
+    // what the others have left is for those whose share was too small
+    let mut unfinished = tried.iter().filter(|tried| tried.is_unfinished()).count();
+    for tried in tried.iter_mut().filter(|tried| tried.is_unfinished()) {
+        tried.again(file, share(budget - start.elapsed().as_secs_f64(), unfinished, 0.0))?;
+        unfinished -= 1;
+    }
+    let (mut facts, mut searches) = (Vec::new(), lints::Searches::new());
+    for tried in tried {
+        facts.push(conclude(program, tried, &mut searches, diagnostics));
     }
     searches.tell();
     diagnostics
         .list
         .extend(lints::of_scenes(shared.engine.into(), program, &mut searches).map_err(choose::usage)?);
     Ok(facts)
+}
+
+/// A solid that was measured as far as its share of the time went.
+struct Tried<'a> {
+    named: &'a NamedSolid,
+    solid: Solid,
+    facts: Facts,
+    /// `None` if it was not measured, because that takes longer than the budget.
+    thin: Option<ThinCells>,
+    notes: Vec<String>,
+    /// Its share, s.
+    seconds: f64,
+}
+
+impl<'a> Tried<'a> {
+    fn new(
+        (named, solid): (&'a NamedSolid, Solid),
+        file: &str,
+        seconds: f64,
+        budget: f64,
+    ) -> Result<Self, Failure> {
+        let operations = solid.graph(ProgramKind::Value).0.len();
+        let mut notes = Vec::new();
+        let (facts, thin) = match too_long(&solid, operations, budget) {
+            Some(why) => {
+                notes.push(format!("solid `{}` has {operations} operations: {why}", named.name));
+                let bounds = solid.bounds().aabb().map(|bounds| Box3::of(&bounds));
+                let empty = *solid.bounds() == Bounds::Empty;
+                (Facts { bounds, empty, ..Facts::unknown(&solid, file) }, None)
+            }
+            None => {
+                let (facts, thin) = measure(&solid, file, &Deadline::after(seconds), &mut notes)?;
+                (facts, Some(thin))
+            }
+        };
+        Ok(Self { named, solid, facts, thin, notes, seconds })
+    }
+
+    fn is_unfinished(&self) -> bool {
+        self.thin.is_some() && !self.facts.unfinished.is_empty()
+    }
+
+    /// Measures it anew, if there is more time than before.
+    fn again(&mut self, file: &str, seconds: f64) -> Result<(), Failure> {
+        if seconds > self.seconds {
+            self.notes.clear();
+            let (facts, thin) = measure(&self.solid, file, &Deadline::after(seconds), &mut self.notes)?;
+            (self.facts, self.thin, self.seconds) = (facts, Some(thin), seconds);
+        }
+        Ok(())
+    }
+}
+
+/// The part of the remaining time that a solid may take: an equal one, but no less than a twentieth of the budget, for
+/// most solids take next to nothing.
+fn share(left: f64, solids: usize, budget: f64) -> f64 {
+    (left / solids as f64).max(LEAST_SHARE * budget).min(left)
+}
+
+/// The least part of the budget that a solid gets.
+const LEAST_SHARE: f64 = 0.05;
+
+/// The most names in a message.
+const MOST_NAMES: usize = 5;
+
+/// Which solids were not measured, and why.
+fn left_out(solids: &[&NamedSolid], measured: usize, elapsed: f64, budget: f64) -> String {
+    let rest = &solids[measured..];
+    let names: Vec<String> = rest.iter().take(MOST_NAMES).map(|named| format!("`{}`", named.name)).collect();
+    let more = match rest.len() - names.len() {
+        0 => String::new(),
+        more => format!(" and {more} more"),
+    };
+    let why = if elapsed > budget { "is spent" } else { "would not reach a tenth of them" };
+    format!(
+        "{measured} of {} solids were measured, for the budget of {budget} s {why}; left out: {}{more}; --budget SECONDS \
+         gives more time, and -s NAME chooses solids",
+        solids.len(),
+        names.join(", ")
+    )
+}
+
+/// What is told of a solid, and the messages about it.
+fn conclude(
+    program: &Program,
+    tried: Tried<'_>,
+    searches: &mut lints::Searches,
+    diagnostics: &mut Diagnostics,
+) -> Facts {
+    let Tried { named, solid, facts: mut found, thin, notes, .. } = tried;
+    notes.into_iter().for_each(note);
+    found.tolerance = program.tolerance(&named.name).map(|tolerance| tolerance.value);
+    let Some(thin) = thin else { return found };
+    diagnostics.list.extend(overflow(program, named, &solid));
+    match program.within_tolerance(&solid) {
+        Some(Ok(chosen)) => {
+            found.program = Some(chosen.variant().name());
+            found.error_bound = Some(chosen.bound());
+        }
+        Some(Err(diagnostic)) => diagnostics.list.push(*diagnostic),
+        None => {}
+    }
+    diagnostics.list.extend(remarks(program, named, &solid, &thin));
+    if found.shows_nothing {
+        diagnostics.list.push(may_be_empty(named));
+    }
+    diagnostics.list.extend(lints::of_solid(program, named, &solid, searches));
+    found
 }
 
 /// Whether no more solids are measured: the budget is spent, or a tenth of it has shown that there are so
