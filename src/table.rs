@@ -24,8 +24,8 @@ pub trait Table: Debug + Send + Sync {
     /// A box around the points whose value is at least `least`.
     fn reach(&self, least: f64) -> Aabb;
 
-    /// The surface where the value is 0, if that is a list of triangles, and positive inside: the corners, and three of their
-    /// numbers for each triangle, counter-clockwise from outside.
+    /// The surface where the value is 0, if that is a list of triangles, and positive inside: the corners, and three
+    /// of their numbers for each triangle, counter-clockwise from outside.
     fn triangles(&self) -> Option<(Vec<DVec3>, Vec<[u32; 3]>)> {
         None
     }

@@ -126,8 +126,8 @@ pub(super) struct Check {
     /// Time at which moving solids are evaluated, in seconds or with a unit
     #[arg(long, value_name = "TIME", default_value_t = 0.0, value_parser = seconds, allow_negative_numbers = true)]
     pub time: f64,
-    /// Time for measuring the solids of a file, in seconds or with a unit. No solid is begun after it, and what is not
-    /// finished by then is left out, and said
+    /// Time for measuring the solids of a file, in seconds or with a unit. Each gets an equal share, and what is left
+    /// goes to those for which it was too little. What is not finished then is left out, and said
     #[arg(long, value_name = "TIME", default_value_t = 10.0, value_parser = seconds)]
     pub budget: f64,
     /// Treat warnings as errors: all of them (`warnings`), or those with a code (W0401); may be repeated
@@ -246,7 +246,8 @@ pub(super) struct Mesh {
     #[arg(long)]
     pub no_slivers: bool,
     /// Contract edges as long as the mesh stays this near to the surface: a length as in 2mm, or a part of
-    /// the mesh's diagonal as in 0.1%. The distance is measured; vertices stay on the surface
+    /// the mesh's diagonal as in 0.1%. The distance is measured; vertices stay on the surface. A mesh that is itself
+    /// farther away stays as it is
     #[arg(long, value_name = "ERROR", value_parser = tolerance, allow_negative_numbers = true)]
     pub simplify: Option<Tolerance>,
     /// Time to look for what the mesh misses, in seconds or with a unit [default: 10 s, or three times that of meshing

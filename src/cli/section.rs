@@ -178,7 +178,8 @@ impl Depth {
             thin_cells(&*surface, &grid, &Deadline::after(LEAST_SEARCH)).map_err(|error| refused(&error))?;
         if thin.count > 0 {
             note(format!(
-                "distances are measured from a mesh of `{name}`, which does not show all of what is thinner than two cells: {}",
+                "distances are measured from a mesh of `{name}`, which does not show all of what is thinner than two \
+                 cells: {}",
                 hidden(&thin, &grid)
             ));
         }

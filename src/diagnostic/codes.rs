@@ -203,9 +203,9 @@ or leave the range of numbers; or the solid has neither bounds nor a scene with 
 THIN_PARTS = "W0408":
 "Parts of the solid, or gaps in it, are thinner than two cells of the usual grid, and pass between its nodes or beside
 its triangles: a mesh with as many cells does not show all of them. The message says where the thinnest is and how many
-cells would show it. With these the volume is measured if the budget allows it; if not, it is that of what the usual grid
-shows. Each cell that is counted holds a point of a surface which the
-grid does not know, so surfaces that only touch, as in `a and not a`, do not count. Edges of wedges and tips of cones
+cells would show it. With these the volume is measured if they are at most 512 and the budget allows it; if not, it is
+that of what the usual grid shows. (That of a mesh alone is the sum over its triangles, whatever their size.) Each cell
+that is counted holds a point of a surface which the grid does not know, so surfaces that only touch, as in `a and not a`, do not count. Edges of wedges and tips of cones
 count as well: every grid shows them a little blunt. If there is nothing else the message says so, and the volume is
 measured all the same.";
 LARGE_ANGLE = "W0409":

@@ -16,7 +16,7 @@
 //! its corners are joined in another way, as beside a sharp rim; the same field and grid give the same bits
 //! on any number of threads.
 //!
-//! What is not promised: marching cubes cut creases between nodes; features thinner than a cell may be
+//! What is not promised: marching cubes cut creases between nodes; features thinner than two cells may be
 //! missed, although they are counted; there is no surface where the field touches zero without a change
 //! of sign.
 //!

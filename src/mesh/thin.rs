@@ -1,4 +1,4 @@
-//! Parts that a grid cannot see: parts of a solid, or gaps in it, that are thinner than a cell. They may pass
+//! Parts that a grid cannot see: parts of a solid, or gaps in it, that are too thin for its cells. They may pass
 //! between the nodes, or beside triangles that show something else.
 //!
 //! A cell holds what the grid says if every face in it is known: it faces nearly as the surface does where it

@@ -33,8 +33,8 @@ impl Affine {
 }
 
 impl Solid {
-    /// The triangles of a solid that is nothing but a mesh in coordinates that depend linearly on the place. `None` for any
-    /// other solid.
+    /// The triangles of a solid that is nothing but a mesh in coordinates that depend linearly on the place. `None`
+    /// for any other solid.
     pub fn triangles(&self) -> Option<Triangles> {
         let (graph, root) = self.formula();
         if graph.len() > MOST_OPERATIONS {

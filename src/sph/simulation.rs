@@ -270,7 +270,7 @@ impl Simulation {
     }
 
     /// Prepares a probe of a run that continues from a checkpoint, with the [memory](Gauge::memory) that it
-    /// had then.
+    /// had then. A force by differences of pressure in a viscous fluid is not known again before the first step.
     ///
     /// # Errors
     /// See [`Simulation::gauge`].

@@ -117,7 +117,7 @@ scene drop {
         let arguments = [&["run", "thin.rfm", "--steps", "1", "--force"], flags].concat();
         rfm(folder.path(), &arguments).expect(0).stderr
     };
-    let missed = "its mesh and its pictures miss what is thinner than a cell";
+    let missed = "its mesh and its pictures do not show all of what is thinner than two cells";
     let told = run(&["--mesh-cells", "16"]);
     assert!(told.contains(missed) && told.contains("`plate`") && told.contains("--mesh-cells"), "{told}");
     assert!(!run(&["--no-frames"]).contains(missed));

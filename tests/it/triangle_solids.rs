@@ -149,7 +149,6 @@ fn a_unit_scales_the_solid() {
     }
 }
 
-/// Machine code, for points and columns, in both precisions, has the bits of the interpreter.
 #[test]
 fn a_mesh_that_is_moved_alone_keeps_its_triangles() {
     let soup = pawn(16);
@@ -184,6 +183,7 @@ fn a_mesh_that_is_moved_alone_keeps_its_triangles() {
     }
 }
 
+/// Machine code, for points and columns, in both precisions, has the bits of the interpreter.
 #[test]
 fn programs_are_the_interpreter() {
     let program =

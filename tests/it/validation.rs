@@ -194,7 +194,7 @@ fn friction_holds_back_a_turning_cylinder() {
     let program = program("couette", &[("particles", 942.0)]);
     let experiment = Experiment::new(&program, "couette", Engine::Auto).unwrap_or_else(|e| panic!("{e}"));
     let mut simulation = experiment.start().unwrap_or_else(|e| panic!("{e}")).simulation;
-    let obstacle = experiment.bodies().iter().position(|body| body.name == "drum").unwrap();
+    let obstacle = experiment.bodies().iter().position(|body| body.solid.name() == "drum").unwrap();
     let mut gauge = simulation.gauge(Probe::Force { obstacle, about: DVec3::ZERO }).unwrap();
     simulation.advance(1.5, |_| ControlFlow::Continue(())).unwrap_or_else(|e| panic!("{e}"));
     simulation.sample(&mut gauge);

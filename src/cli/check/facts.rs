@@ -22,13 +22,14 @@ pub(super) struct Facts {
     pub empty: bool,
     pub bounds: Option<Box3>,
     pub volume: Option<f64>,
-    /// Estimated from three resolutions.
+    /// Estimated from three resolutions; what rounding may add for a solid that is a mesh alone.
     pub volume_error: Option<f64>,
     pub area: Option<f64>,
-    /// Estimated from three resolutions.
+    /// As that of the volume.
     pub area_error: Option<f64>,
     pub components: Option<usize>,
-    /// Whether two resolutions have as many components, and no part but the edges of wedges is thinner than a cell. If
+    /// Whether two resolutions have as many components, and no part but the edges of wedges is too thin for the cells
+    /// with which the volume was measured. If
     /// not, the volume, the area and their errors are those of what the finer one shows. `None` if the search for
     /// such parts was ended.
     pub resolved: Option<bool>,
@@ -42,7 +43,7 @@ pub(super) struct Facts {
     /// The number of cells of the finer grid in which parts of the surface hide, see `mesh::thin_cells`.
     pub thin_cells: Option<usize>,
     /// The cells along the longest side of the finest grid that the volume and the area were measured on: more than
-    /// the usual ones where the solid is too thin for these. Null if there was no need of a grid.
+    /// the usual ones where the solid is too thin for these. Null if there was no need of a grid, or no volume.
     pub cells: Option<usize>,
     /// What was not finished within the budget: `volume` (and area), `thin_cells`.
     #[serde(skip_serializing_if = "Vec::is_empty")]
@@ -50,6 +51,9 @@ pub(super) struct Facts {
     /// The number of components that half as many cells show.
     #[serde(skip)]
     pub components_coarser: Option<usize>,
+    /// Whether the cells that its thin parts need were too many for its share of the time.
+    #[serde(skip)]
+    pub wants_time: bool,
     /// Why there is no volume although there are bounds.
     #[serde(skip)]
     pub no_volume: Option<String>,
@@ -76,9 +80,10 @@ impl Facts {
             error_bound: None,
             time: solid.moves().then(|| solid.time()),
             thin_cells: None,
-            cells: Some(VOLUME_CELLS),
+            cells: None,
             unfinished: Vec::new(),
             components_coarser: None,
+            wants_time: false,
             no_volume: None,
             shows_nothing: false,
         }
@@ -169,7 +174,9 @@ fn print_solid(solid: &Facts) {
             say!("    measured    with {cells} cells along its longest side")
         }
         Some(_) => {}
-        None if !solid.empty => say!("    measured    exactly: the sums over the triangles of its mesh"),
+        None if solid.volume.is_some() && !solid.empty => {
+            say!("    measured    by the triangles of its mesh")
+        }
         None => {}
     }
     if solid.resolved == Some(false) {

@@ -1,4 +1,4 @@
-//! Measures a solid: its volume and area on meshes, and what is thinner than their cells.
+//! Measures a solid: its volume and area on meshes, and what is too thin for their cells.
 
 use super::facts::{Box3, Facts, RESOLUTION, VOLUME_CELLS};
 use crate::cli::deadline::Deadline;
@@ -53,25 +53,29 @@ pub(super) fn measure(
         }
     };
     facts.bounds = Some(Box3::of(bounds));
+    let triangles = solid.triangles().map(|(places, triangles)| Mesh::from_triangles(places, triangles));
+    if let Some(mesh) = &triangles {
+        exact(mesh, &mut facts);
+    }
     let surface = solid.surface(bounds.grown(0.1 * bounds.size().max_element()));
     let grid = match Grid::around(bounds, RESOLUTION) {
         Ok(grid) => grid,
         Err(error) => {
             // one solid that is next to nothing, or far away, says nothing about the others of a file
             let place = to_thousandths(bounds.centre());
-            facts.no_volume = Some(format!("the room around {place} cannot be divided: {error}"));
+            let why = format!("the room around {place} cannot be divided: {error}");
+            facts.no_volume = Some(why).filter(|_| facts.volume.is_none());
             return Ok((facts, ThinCells::NONE));
         }
     };
     let mut shows_nothing = false;
-    if let Some((places, triangles)) = solid.triangles() {
+    if triangles.is_some() {
         let thin = thin_cells(solid, &*surface, &grid, deadline, notes);
         tell_of_end(solid, thin, &mut facts, notes);
-        exact(&Mesh::from_triangles(places, triangles), &mut facts);
         return Ok((facts, thin.unwrap_or(ThinCells::NONE)));
     }
     match mesh::volume(&*surface, bounds, VOLUME_CELLS, deadline) {
-        Ok(found) => take(&found, &mut facts),
+        Ok(found) => take(&found, VOLUME_CELLS, &mut facts),
         Err(VolumeError::TooThin) => {
             facts.no_volume =
                 Some(format!("it is empty, or too thin for {VOLUME_CELLS} cells along its longest side"));
@@ -101,13 +105,14 @@ pub(super) fn measure(
     if let Some(thin) = thin.filter(|_| facts.resolved == Some(false)) {
         refine((solid, &*surface, bounds), (&grid, thin), deadline, (&mut facts, notes));
     }
-    // a part thinner than a cell would have been found
+    // a part too thin for a cell would have been found
     facts.shows_nothing = shows_nothing && thin.is_some_and(|thin| thin.count == 0 && !thin.ended);
     Ok((facts, thin.unwrap_or(ThinCells::NONE)))
 }
 
-/// The figures of meshes.
-fn take(found: &Volume, facts: &mut Facts) {
+/// The figures of meshes, the finest of which has so many cells along the longest side.
+fn take(found: &Volume, cells: usize, facts: &mut Facts) {
+    facts.cells = Some(cells);
     facts.volume = Some(found.volume);
     facts.volume_error = Some(found.error);
     facts.area = Some(found.area);
@@ -120,16 +125,18 @@ fn take(found: &Volume, facts: &mut Facts) {
 fn exact(mesh: &Mesh, facts: &mut Facts) {
     let shells = mesh::shells(mesh);
     let volume = shells.iter().map(|shell| shell.volume).sum::<f64>();
+    // that of a hollow body is a difference, and places far from the origin are rounded
+    let of_both_sides = shells.iter().map(|shell| shell.volume.abs()).sum::<f64>();
+    let farthest = mesh.positions.iter().fold(0.0, |most, p| f64::max(most, p.abs().max_element()));
     let area = shells.iter().map(|shell| shell.area).sum::<f64>();
     let components = shells.iter().filter(|shell| shell.is_solid()).count();
     facts.volume = Some(volume);
-    facts.volume_error = Some(ROUNDING * volume);
+    facts.volume_error = Some(ROUNDING * of_both_sides + f64::EPSILON * farthest * area);
     facts.area = Some(area);
     facts.area_error = Some(ROUNDING * area);
     facts.components = Some(components);
     facts.components_coarser = Some(components);
     facts.resolved = Some(true);
-    facts.cells = None;
 }
 
 /// Says that the search for thin parts was ended, or how many cells hide some.
@@ -156,25 +163,35 @@ fn refine(
     for _ in 0..REFINED {
         let Some(cells) = needed.filter(|&cells| cells > VOLUME_CELLS && cells <= MOST_CELLS) else { return };
         let Ok(grid) = Grid::around(bounds, Resolution::Cells(cells)) else { return };
-        let thin = mesh::thin_cells(surface, &grid, deadline).ok().filter(|thin| !thin.ended);
-        let is_shown = thin.is_some_and(|thin| thin.count == 0 || thin.is_wedge);
-        if thin.is_some() && !is_shown {
-            let more = thin.and_then(|thin| thin.cells_needed(&grid)).unwrap_or(0);
+        let no_time = format!(
+            "there was no time to measure `{}` with the {cells} cells that show its thin parts; --budget gives it more",
+            solid.name()
+        );
+        let thin = match mesh::thin_cells(surface, &grid, deadline) {
+            Ok(thin) if !thin.ended => thin,
+            Ok(_) => {
+                facts.wants_time = true;
+                return notes.push(no_time);
+            }
+            // its volume has reported it
+            Err(_) => return,
+        };
+        if thin.count > 0 && !thin.is_wedge {
             // where it is thinnest elsewhere, or in steps where the same place needs a little more
-            needed = Some(more.max(cells + cells / 4));
+            needed = Some(thin.cells_needed(&grid).unwrap_or(0).max(cells + cells / 4));
             continue;
         }
-        match mesh::volume(surface, bounds, cells, deadline).ok().filter(|_| is_shown) {
-            Some(found) if found.solids == found.solids_coarser => {
-                take(&found, facts);
+        match mesh::volume(surface, bounds, cells, deadline) {
+            Ok(found) if found.solids == found.solids_coarser => {
+                take(&found, cells, facts);
                 facts.resolved = Some(true);
-                facts.cells = Some(cells);
             }
-            Some(_) => {}
-            None => notes.push(format!(
-                "there was no time to measure `{}` with the {cells} cells that show its thin parts; --budget gives it more",
-                solid.name()
-            )),
+            Err(VolumeError::Mesh(MeshError::Ended)) => {
+                facts.wants_time = true;
+                notes.push(no_time);
+            }
+            // the figures of the usual cells stay
+            Ok(_) | Err(_) => {}
         }
         return;
     }

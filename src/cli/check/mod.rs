@@ -192,20 +192,21 @@ fn solids(
         [] => all.iter().collect(),
         names => names.iter().map(chosen).collect::<Result<_, _>>()?,
     };
-    let mut tried: Vec<Tried<'_>> = Vec::new();
+    let (mut tried, mut are_all): (Vec<Tried<'_>>, bool) = (Vec::new(), true);
     for (number, &named) in named_solids.iter().enumerate() {
         let elapsed = start.elapsed().as_secs_f64();
         if is_over(number, named_solids.len(), elapsed, budget) {
             note(left_out(&named_solids, number, elapsed, budget));
+            are_all = false;
             break;
         }
         let solid = program.solid_with(&named.name, shared.engine.into()).map_err(choose::usage)?;
         let seconds = share(budget - elapsed, named_solids.len() - number, budget);
         tried.push(Tried::new((named, solid.at(options.time)), file, seconds, budget)?);
     }
-    // what the others have left is for those whose share was too small
+    // what the others have left is for those whose share was too small; of too many solids nothing is left
     let mut unfinished = tried.iter().filter(|tried| tried.is_unfinished()).count();
-    for tried in tried.iter_mut().filter(|tried| tried.is_unfinished()) {
+    for tried in tried.iter_mut().filter(|tried| are_all && tried.is_unfinished()) {
         tried.again(file, share(budget - start.elapsed().as_secs_f64(), unfinished, 0.0))?;
         unfinished -= 1;
     }
@@ -257,7 +258,7 @@ impl<'a> Tried<'a> {
     }
 
     fn is_unfinished(&self) -> bool {
-        self.thin.is_some() && !self.facts.unfinished.is_empty()
+        self.thin.is_some() && (!self.facts.unfinished.is_empty() || self.facts.wants_time)
     }
 
     /// Measures it anew, if there is more time than before.
@@ -293,8 +294,8 @@ fn left_out(solids: &[&NamedSolid], measured: usize, elapsed: f64, budget: f64) 
     };
     let why = if elapsed > budget { "is spent" } else { "would not reach a tenth of them" };
     format!(
-        "{measured} of {} solids were measured, for the budget of {budget} s {why}; left out: {}{more}; --budget SECONDS \
-         gives more time, and -s NAME chooses solids",
+        "{measured} of {} solids were measured, because the budget of {budget} s {why}; left out: {}{more}; \
+         --budget SECONDS gives more time, and -s NAME chooses solids",
         solids.len(),
         names.join(", ")
     )

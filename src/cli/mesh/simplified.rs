@@ -14,7 +14,7 @@ use rfm::mesh::{Mesh, Quality, Reference, simplify};
 
 /// What was found about a simplified mesh.
 pub(super) struct Simplified {
-    /// `None` if it was plain at once that the tolerance cannot be kept: the mesh is what it was.
+    /// `None` if the tolerance was refused at once, because the mesh itself is farther away: it is what it was.
     pub quality: Option<Quality>,
     /// The distance from the surface in metres, or what it is at least if there is no quality.
     pub error: f64,
@@ -53,8 +53,8 @@ const COARSE: f64 = 0.2;
 /// of them lie a few hundredths further off.
 const AIMS: [f64; 3] = [0.9, 0.75, 0.5];
 
-/// Simplifies a mesh as far as the tolerance allows. If the measured distance is too large at every aim, the
-/// mesh stays as it was.
+/// Simplifies a mesh as far as the tolerance allows. If its own distance is larger, or the measured one is too large
+/// at every aim, the mesh stays as it was.
 pub(super) fn simplified(
     mesh: &mut Mesh,
     tolerance: Tolerance,
@@ -75,7 +75,7 @@ pub(super) fn simplified(
         MeshMethod::Mc => "try more cells, or --method dc for sharp edges",
         MeshMethod::Dc => "try more cells",
     };
-    // most of the time goes into contracting edges and measuring what comes of it
+    // asked first, because contracting edges and measuring what comes of it take most of the time
     let started = Instant::now();
     let least = reference.least_distance(mesh);
     if least > tolerance {
@@ -109,12 +109,11 @@ pub(super) fn simplified(
         let own: &Quality = own.get_or_insert_with(|| measure(mesh, &mut measuring));
         if own.hausdorff() > tolerance {
             note(format!(
-                "before it is simplified the mesh is already {:.2e} m from the surface, more than the \
-                 {tolerance:.2e} m asked for; {advice}",
+                "the mesh is {:.2e} m from the surface as it is, more than the {tolerance:.2e} m asked for, so all \
+                 triangles are kept; {advice}",
                 own.hausdorff()
             ));
-            *mesh = less;
-            return Simplified::new(quality, (from, tolerance), (simplifying, measuring));
+            return Simplified::new(*own, (from, tolerance), (simplifying, measuring));
         }
     }
     note("no simplified mesh was found to be near enough to the surface: all triangles are kept");

@@ -67,9 +67,9 @@ struct SimplifiedFigures {
     simplify_error: f64,
     /// The time to simplify and to measure.
     simplify_milliseconds: f64,
-    /// Whether it was plain at once that the tolerance cannot be kept.
+    /// Whether the tolerance was refused at once, because the mesh itself is farther away.
     #[serde(skip)]
-    is_hopeless: bool,
+    is_refused: bool,
     #[serde(skip)]
     simplifying: f64,
     #[serde(skip)]
@@ -83,7 +83,7 @@ impl From<&Simplified> for SimplifiedFigures {
             simplify_tolerance: simplified.tolerance,
             simplify_error: simplified.error,
             simplify_milliseconds: simplified.simplifying + simplified.measuring,
-            is_hopeless: simplified.quality.is_none(),
+            is_refused: simplified.quality.is_none(),
             simplifying: simplified.simplifying,
             measuring: simplified.measuring,
         }
@@ -152,7 +152,7 @@ impl MeshSummary {
             self.max_distance,
             self.rms_distance
         );
-        if let Some(kept) = self.simplified.as_ref().filter(|simplified| simplified.is_hopeless) {
+        if let Some(kept) = self.simplified.as_ref().filter(|simplified| simplified.is_refused) {
             say!(
                 "not simplified: at least {:.2e} from the surface as it is, {:.2e} allowed",
                 kept.simplify_error,

@@ -58,8 +58,8 @@ impl Bodies {
                 mesh::thin_cells(&*surface, &grid, &Deadline::after(LEAST_SEARCH)).map_err(Failure::usage)?;
             if thin.count > 0 {
                 note(format!(
-                    "the fluid meets all of the obstacle `{name}`, but its mesh and its pictures miss what is thinner than a \
-                     cell {}; --mesh-cells sets how many there are",
+                    "the fluid meets all of the obstacle `{name}`, but its mesh and its pictures do not show all of what is \
+                     thinner than two cells: {}; --mesh-cells sets how many there are",
                     hidden(&thin, &grid)
                 ));
             } else if thin.ended {

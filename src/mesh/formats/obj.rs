@@ -6,8 +6,8 @@
 //! trimesh one of each normal unless `maintain_order` is set, and meshio refuses the file. PLY has one normal
 //! for a vertex, and is closed for all of them.
 //!
-//! Invariant: every number is written with the fewest digits that read back to the same `f64`, but for what rounding has
-//! left of zeros.
+//! Invariant: every number is written with the fewest digits that read back to the same `f64`, but for what
+//! rounding has left of zeros.
 
 use std::io::{self, Write};
 

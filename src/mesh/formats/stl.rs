@@ -2,8 +2,8 @@
 //!
 //! Invariant: normals are computed from the triangles in `f64`, before corners are rounded, so slivers keep a
 //! direction. A triangle without area gets the zero normal, which readers take as "compute it". Different vertices have
-//! different numbers, because readers know vertices by their numbers alone: a mesh that is closed and manifold is so in
-//! the file.
+//! different numbers, as far as a few steps of the last digit allow, because readers know vertices by their numbers
+//! alone: a mesh that is closed and manifold is so in the file, unless it is too small and too far away for `f32`.
 
 use std::io::{self, Write};
 
@@ -87,7 +87,10 @@ fn places(mesh: &Mesh, length: LengthUnit) -> Vec<[f32; 3]> {
             None => rounded,
             Some(earlier) => {
                 let mut free = beside(rounded, *p - earlier);
-                free.find(|near| !taken.contains_key(&near.map(f32::to_bits))).unwrap_or(rounded)
+                free.find(|near| {
+                    near.iter().all(|c| c.is_finite()) && !taken.contains_key(&near.map(f32::to_bits))
+                })
+                .unwrap_or(rounded)
             }
         };
         taken.entry(place.map(f32::to_bits)).or_insert(vertex);
@@ -96,15 +99,18 @@ fn places(mesh: &Mesh, length: LengthUnit) -> Vec<[f32; 3]> {
     places
 }
 
-/// The numbers near a place, the nearest ones first: a step of the last digit along the axis along which `towards` is
-/// longest, on its side, then along the others, then on the other side; then two steps, and so on. A step is that of the
+/// The most steps of the last digit by which a vertex is moved.
+const MOST_STEPS: u8 = 8;
+
+/// The numbers near a place, the nearest ones first: a step of the last digit along the axis along which `towards`
+/// is longest, on its side, then along the others, then on the other side; then two steps, and so on. A step is that of the
 /// largest coordinate: smaller ones beside zero are lost in what readers do with them.
 fn beside(place: [f32; 3], towards: DVec3) -> impl Iterator<Item = [f32; 3]> {
     let largest = place.iter().fold(0.0_f32, |largest, c| largest.max(c.abs())).max(f32::MIN_POSITIVE);
     let mut axes = [0, 1, 2];
     axes.sort_by(|&i, &j| towards[j].abs().total_cmp(&towards[i].abs()));
     let own = towards.to_array().map(|c| if c < 0.0 { -1.0 } else { 1.0 });
-    (1_u8..=u8::MAX).flat_map(move |steps| {
+    (1..=MOST_STEPS).flat_map(move |steps| {
         [1.0, -1.0].into_iter().flat_map(move |side| {
             axes.into_iter().map(move |axis| {
                 let mut near = place;

@@ -1,7 +1,7 @@
 //! 3MF, for printers: a zip archive with the triangles as XML, which states their unit.
 //!
-//! Invariant: every number is written with the fewest digits that read back to the same `f64`, but for what rounding has
-//! left of zeros. Equal meshes give equal bytes, because the archive holds no date.
+//! Invariant: every number is written with the fewest digits that read back to the same `f64`, but for what
+//! rounding has left of zeros. Equal meshes give equal bytes, because the archive holds no date.
 
 use std::io::{self, Cursor, Write};
 

@@ -1,7 +1,7 @@
 //! The force of a fluid on an obstacle by its state alone: ∫ p n, and friction, over the pieces of its surface that the
 //! fluid touches.
 //!
-//! It is near the truth in a fluid at rest, and is used where no step notes what walls do. In a jet on a
+//! It is near the truth in a fluid at rest, and is used where no step notes what walls do by pressure. In a jet on a
 //! plate of eight spacings, pressures of particles at the wall oscillate. They are never negative, so their
 //! mean is too large: this force was 1.8 times the loss of the jet's momentum.
 //!
@@ -47,8 +47,8 @@ pub fn about([x, y, z, u, v, w]: [f64; 6], point: DVec3) -> [f64; 6] {
     [x, y, z, moment.x, moment.y, moment.z]
 }
 
-/// Force, N, and torque about a point, N·m, on an obstacle by pressure, and if asked by friction where the fluid sticks
-/// to it. Zero for methods without pressure at walls.
+/// Force, N, and torque about a point, N·m, on an obstacle by pressure, and if asked by friction where the fluid
+/// sticks to it. Zero for methods without pressure at walls.
 pub fn on_surface(core: &Core, obstacle: usize, point: DVec3, with_friction: bool) -> [f64; 6] {
     if !core.parameters.walls_have_density() {
         return [0.0; 6];

@@ -58,9 +58,10 @@ pub enum Probe {
     /// Force of the fluid on an obstacle, N, and its torque about a point, N·m.
     ///
     /// It is the momentum that the obstacle has taken from particles since the last sample, by pressure,
-    /// friction and contacts, over that time; with the paper's method there are contacts only. At the start,
-    /// and for `wcsph` with differences of pressure, whose forces do not cancel in pairs, pressure and
-    /// friction are instead those of the particles in front of the obstacle's faces. The force of surface
+    /// friction and contacts, over that time; with the paper's method there are contacts only. For `wcsph` with
+    /// differences of pressure, whose forces do not cancel in pairs, pressure is instead that of the particles in
+    /// front of the obstacle's faces at the instant of the sample. At the start that is so for all methods, and
+    /// for friction too. The force of surface
     /// tension where the surface meets the obstacle does not count, so a hanging drop seems to push.
     Force {
         /// Number of the obstacle, from 0.
@@ -167,9 +168,11 @@ impl Gauge {
                     (core.time, core.contacts.as_ref().map_or([0.0; 6], |c| c.total(obstacle)));
                 let passed = time - self.last[0];
                 let is_complete = core.parameters.method.numerics().noted() == Noted::Forces;
-                let mut force = match passed > 0.0 {
-                    true if is_complete => [0.0; 6],
-                    is_noted => force::on_surface(core, obstacle, about, !is_noted),
+                let is_noted = passed > 0.0;
+                let mut force = if is_noted && is_complete {
+                    [0.0; 6]
+                } else {
+                    force::on_surface(core, obstacle, about, !is_noted)
                 };
                 if passed > 0.0 {
                     let impulse = force::about(std::array::from_fn(|k| total[k] - self.last[1 + k]), about);
