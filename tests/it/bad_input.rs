@@ -89,7 +89,7 @@ fn a_check_ends_early_with_what_it_has() {
     let (found, said) = measured(5000);
     assert!((1..5000).contains(&found), "{found}");
     assert!(
-        said.contains(&format!("{found} of 5000 solids were measured, for the budget of 1 s ")),
+        said.contains(&format!("{found} of 5000 solids were measured, because the budget of 1 s ")),
         "{said}"
     );
     let (next, more) = (found + 1, 5000 - found - 5);
