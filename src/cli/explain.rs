@@ -10,7 +10,7 @@ use super::run::{experiment, start};
 use super::shared::Shared;
 use super::{Failure, choose, input};
 use rfm::codegen::{CodegenError, Listing, Request, Shape, target_description};
-use rfm::diagnostic::{Span, explain, explanations, nearest};
+use rfm::diagnostic::{Span, explain, nearest};
 use rfm::geom::{Aabb, to_thousandths};
 use rfm::interval::Interval;
 use rfm::ir::{Node, dump};
@@ -30,8 +30,8 @@ pub(super) fn run(shared: &Shared, options: &Explain) -> Result<(), Failure> {
         return Ok(());
     };
     if subject == "codes" && !Path::new(subject).exists() {
-        for (code, text) in explanations() {
-            say!("{code}  {}", first_sentence(text));
+        for (code, about) in page::messages() {
+            say!("{code}  {about}");
         }
         return Ok(());
     }
@@ -94,19 +94,6 @@ fn no_such_word(subject: &str) -> Failure {
         "there is no word and no file `{subject}`{near} (`rfm explain words` lists all words, `rfm explain codes` all \
          messages)"
     ))
-}
-
-/// The first sentence of an explanation, on one line.
-fn first_sentence(text: &str) -> String {
-    let words = text.split_whitespace();
-    let mut sentence: Vec<&str> = Vec::new();
-    for word in words {
-        sentence.push(word);
-        if word.ends_with('.') && word.chars().filter(|c| *c == '.').count() == 1 {
-            break;
-        }
-    }
-    sentence.join(" ")
 }
 
 /// Prints what the stages of the compiler make of one solid.

@@ -1,6 +1,7 @@
-//! `rfm explain WORD` and `rfm explain words`: the words of the language and the keys of scenes, from their
-//! declarations.
+//! `rfm explain WORD` and `rfm explain words`: the words of the language, the keys of scenes, the methods and the
+//! messages, from their declarations.
 
+use rfm::diagnostic::explanations;
 use rfm::lower::vocabulary;
 use rfm::sph::Method;
 
@@ -14,7 +15,7 @@ const HEAD: &str = "# The words of the language, one by one
 
 `rfm explain words` prints this page from the declarations of the words, and `rfm explain WORD` a part of it. Formulas, examples
 and what fields mean are on the [page of words](README.md); the keys that belong to one method are with the
-[methods](../src/sph/methods/README.md).
+[methods](../src/sph/methods/README.md). The messages about files come last.
 ";
 
 /// All words and keys as a page of Markdown.
@@ -47,7 +48,33 @@ pub(in crate::cli) fn all() -> String {
             page += &entry(key, &keys::about(block, key, Some(Method::default())));
         }
     }
+    page += "\n## Methods\n\n";
+    for method in Method::all() {
+        page += &entry(method.name(), method.info().title);
+    }
+    page += "\n## Messages\n\n`rfm explain CODE` says more: why it is told, and what to do. `--deny CODE` makes an error of a warning.\n\n";
+    for (code, about) in messages() {
+        page += &entry(code, &about);
+    }
     page
+}
+
+/// The codes of messages, and the first sentence about each.
+pub(in crate::cli) fn messages() -> impl Iterator<Item = (&'static str, String)> {
+    explanations().map(|(code, text)| (code, first_sentence(text)))
+}
+
+/// The first sentence of an explanation, on one line.
+fn first_sentence(text: &str) -> String {
+    let words = text.split_whitespace();
+    let mut sentence: Vec<&str> = Vec::new();
+    for word in words {
+        sentence.push(word);
+        if word.ends_with('.') && word.chars().filter(|c| *c == '.').count() == 1 {
+            break;
+        }
+    }
+    sentence.join(" ")
 }
 
 /// What is known of one word: functions, methods and keys of this name, and what begins items. `None` if

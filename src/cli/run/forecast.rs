@@ -31,7 +31,7 @@ const USUAL_NEIGHBOURS: f64 = 500.0;
 const FIRST: u32 = 2;
 
 /// Most steps that are timed, and the seconds of the clock after which no further step begins.
-const TRIAL: (u32, f64) = (20, 0.3);
+const TRIAL: (u32, f64) = (20, 0.15);
 
 /// The output of `--dry-run`.
 #[derive(Debug, Serialize)]
