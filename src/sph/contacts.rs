@@ -18,9 +18,10 @@ pub struct Contacts {
     work_now: Mutex<Vec<(usize, f64)>>,
     /// Work of moving walls on the fluid, J, that has not been fetched yet.
     work: f64,
-    /// Accelerations by viscosity in the present step, m/s², with the particles' indices, as they are found.
+    /// Accelerations by viscosity in the present step, m/s², with the particles' indices, in the order in which threads
+    /// find them.
     drags_now: Mutex<Vec<(usize, DVec3)>>,
-    /// The same in the order of the particles.
+    /// Those of the last step, by the particles' indices.
     drags: Vec<(usize, DVec3)>,
 }
 
