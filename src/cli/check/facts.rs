@@ -29,9 +29,8 @@ pub(super) struct Facts {
     pub area_error: Option<f64>,
     pub components: Option<usize>,
     /// Whether two resolutions have as many components, and no part but the edges of wedges is too thin for the cells
-    /// with which the volume was measured. If
-    /// not, the volume, the area and their errors are those of what the finer one shows. `None` if the search for
-    /// such parts was ended.
+    /// with which the volume was measured. If not, the volume, the area and their errors are those of what the finer
+    /// one shows. `None` if the search for such parts was ended.
     pub resolved: Option<bool>,
     /// The tolerance for the error of ω that the file states, the program that keeps it, and the program's
     /// certified bound.

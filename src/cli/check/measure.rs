@@ -46,7 +46,6 @@ pub(super) fn measure(
                 components: Some(0),
                 resolved: Some(true),
                 thin_cells: Some(0),
-                cells: None,
                 ..facts
             };
             return Ok((facts, ThinCells::NONE));

@@ -103,8 +103,8 @@ fn places(mesh: &Mesh, length: LengthUnit) -> Vec<[f32; 3]> {
 const MOST_STEPS: u8 = 8;
 
 /// The numbers near a place, the nearest ones first: a step of the last digit along the axis along which `towards`
-/// is longest, on its side, then along the others, then on the other side; then two steps, and so on. A step is that of the
-/// largest coordinate: smaller ones beside zero are lost in what readers do with them.
+/// is longest, on its side, then along the others, then on the other side; then two steps, and so on. A step is that
+/// of the largest coordinate: smaller ones beside zero are lost in what readers do with them.
 fn beside(place: [f32; 3], towards: DVec3) -> impl Iterator<Item = [f32; 3]> {
     let largest = place.iter().fold(0.0_f32, |largest, c| largest.max(c.abs())).max(f32::MIN_POSITIVE);
     let mut axes = [0, 1, 2];

@@ -61,8 +61,8 @@ pub enum Probe {
     /// friction and contacts, over that time; with the paper's method there are contacts only. For `wcsph` with
     /// differences of pressure, whose forces do not cancel in pairs, pressure is instead that of the particles in
     /// front of the obstacle's faces at the instant of the sample. At the start that is so for all methods, and
-    /// for friction too. The force of surface
-    /// tension where the surface meets the obstacle does not count, so a hanging drop seems to push.
+    /// for friction too. The force of surface tension where the surface meets the obstacle does not count, so a
+    /// hanging drop seems to push.
     Force {
         /// Number of the obstacle, from 0.
         obstacle: usize,
@@ -174,7 +174,7 @@ impl Gauge {
                 } else {
                     force::on_surface(core, obstacle, about, !is_noted)
                 };
-                if passed > 0.0 {
+                if is_noted {
                     let impulse = force::about(std::array::from_fn(|k| total[k] - self.last[1 + k]), about);
                     force.iter_mut().zip(impulse).for_each(|(force, impulse)| *force += impulse / passed);
                 }
