@@ -465,32 +465,14 @@ pub(super) fn has_surface<'a>(
         return true;
     }
     let (moving, still): (Vec<&Solid>, Vec<&Solid>) = bodies.partition(|body| body.moves());
-    let all_at = |time: f64| -> Vec<Solid> { moving.iter().map(|body| body.at(time)).collect() };
-    let now = all_at(0.0);
-    let later: Vec<Vec<Solid>> = if moving.is_empty() {
-        Vec::new()
-    } else {
-        let [first, last] = LATER;
-        let factor = (last / first).powf(1.0 / f64::from(INSTANTS - 1));
-        (0..INSTANTS).map(|k| all_at(first * factor.powi(k))).collect()
-    };
+    let now = all_at(&moving, 0.0);
     let (still, now) = (Crowd::of(still.into_iter()), Crowd::of(now.iter()));
-    let later: Vec<Crowd> = later.iter().map(|bodies| Crowd::of(bodies.iter())).collect();
     let (min, size) = (scene.domain.min, scene.domain.size());
-    let (mut dry, mut wet, mut samples) = (0.0, 0.0, 0.0);
-    // samples that bodies have left, less those that they have entered
-    let mut left = vec![0.0; later.len()];
-    for k in 1..=MOST_SAMPLES {
-        let at = min + size * (f64::from(k) * SPREAD).fract();
-        samples += 1.0;
-        if !still.is_free(at) {
-            continue;
-        }
-        let is_free = now.is_free(at);
-        for (left, then) in left.iter_mut().zip(&later) {
-            *left += f64::from(then.is_free(at)) - f64::from(is_free);
-        }
-        if !is_free {
+    let places = (1..=MOST_SAMPLES).map(|k| min + size * (f64::from(k) * SPREAD).fract());
+    let (mut dry, mut wet, mut samples) = (0.0, 0.0, 0);
+    for at in places.clone() {
+        samples += 1;
+        if !(still.is_free(at) && now.is_free(at)) {
             continue;
         }
         *(if fluid.omega(at) > 0.0 { &mut wet } else { &mut dry }) += 1.0;
@@ -502,9 +484,37 @@ pub(super) fn has_surface<'a>(
             break;
         }
     }
-    let changed = left.into_iter().map(f64::abs).fold(0.0, f64::max);
-    let particles = scene.domain.volume() * wet / samples / spacing.powi(3);
-    dry + wet < LEAST_SAMPLES || particles < FEWEST || dry + changed >= (LEAST_ROOM - 1.0) * wet
+    let particles = scene.domain.volume() * wet / samples as f64 / spacing.powi(3);
+    let room = (LEAST_ROOM - 1.0) * wet;
+    let is_unsure = dry + wet < LEAST_SAMPLES || particles < FEWEST;
+    // only now, because to find out how bodies will move takes longest
+    is_unsure || dry + changed(&still, &now, &moving, places.take(samples)) >= room
+}
+
+fn all_at(solids: &[&Solid], time: f64) -> Vec<Solid> {
+    solids.iter().map(|body| body.at(time)).collect()
+}
+
+/// By how many of some places the room changes at most when bodies move: places that they have left, less those
+/// that they have entered.
+fn changed(
+    still: &Crowd<'_>,
+    now: &Crowd<'_>,
+    moving: &[&Solid],
+    places: impl Iterator<Item = DVec3> + Clone,
+) -> f64 {
+    if moving.is_empty() {
+        return 0.0;
+    }
+    let [first, last] = LATER;
+    let factor = (last / first).powf(1.0 / f64::from(INSTANTS - 1));
+    let at_instant = |k: i32| {
+        let then = all_at(moving, first * factor.powi(k));
+        let then = Crowd::of(then.iter());
+        let open = places.clone().filter(|at| still.is_free(*at));
+        open.map(|at| f64::from(then.is_free(at)) - f64::from(now.is_free(at))).sum::<f64>()
+    };
+    (0..INSTANTS).map(at_instant).map(f64::abs).fold(0.0, f64::max)
 }
 
 /// A length as a file writes it, with three digits: `2.5 mm`, `0.12 m`.

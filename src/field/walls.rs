@@ -70,10 +70,22 @@ pub trait Walls: Field {
         clearance_by_ranges(self, p, most)
     }
 
+    /// Whether a box is proven to lie in the fluid at all times that the field covers.
+    fn is_outside(&self, over: &Aabb) -> bool {
+        self.range(over).hi < 0.0
+    }
+
     /// Whether a box is proven to lie in the fluid, with every point of it at least `reach` away from any
     /// surface, at all times that the field covers.
     fn is_far(&self, over: &Aabb, reach: f64) -> bool {
         self.range(&over.grown(reach)).hi < 0.0
+    }
+
+    /// A box that holds all places of a domain that are inside, or nearer to a surface than `reach`, at any time
+    /// that the field covers. `None` if no such box is known; the default knows none. The box is found at once,
+    /// so that it may be too large.
+    fn surroundings(&self, _domain: &Aabb, _reach: f64) -> Option<Aabb> {
+        None
     }
 }
 
@@ -98,8 +110,16 @@ impl<F: Walls + ?Sized> Walls for &F {
         (**self).clearance(p, most)
     }
 
+    fn is_outside(&self, over: &Aabb) -> bool {
+        (**self).is_outside(over)
+    }
+
     fn is_far(&self, over: &Aabb, reach: f64) -> bool {
         (**self).is_far(over, reach)
+    }
+
+    fn surroundings(&self, domain: &Aabb, reach: f64) -> Option<Aabb> {
+        (**self).surroundings(domain, reach)
     }
 }
 

@@ -26,7 +26,7 @@ use super::{
     plan::plan,
     probes::{Gauge, Probe},
     stats::Stats,
-    walls::{Boundary, Maps, Obstacle},
+    walls::{Boundary, BroadPhase, Maps, Obstacle},
 };
 
 /// Distance from an obstacle at which particles stop, over the support radius.
@@ -72,6 +72,7 @@ impl Simulation {
         parameters.validate().map_err(SetupError::Parameter)?;
         parameters.sticks |= obstacles.iter().any(|obstacle| obstacle.slip == Slip::No);
         let clearance = CLEARANCE * parameters.support_radius;
+        let broad_phase = BroadPhase::unknown(obstacles.len());
         let mut boundary = Boundary {
             domain,
             wall_restitution: parameters.wall_restitution,
@@ -83,6 +84,7 @@ impl Simulation {
             step: 0.0,
             clearance,
             maps: Maps::default(),
+            broad_phase,
         };
         boundary.move_to(time, time);
         check_setup(&boundary, &particles)?;

@@ -66,6 +66,7 @@ pub struct CellMap {
     /// What decides the value in the cells.
     pub(super) deciding: Demanded,
     reach: f64,
+    has_few_leaves: bool,
     /// The length by which cells were grown, reach included: points that rounding puts into the next cell are
     /// still right.
     margin: f64,
@@ -136,8 +137,9 @@ impl CellMap {
         let beside = AROUND * domain.size().max_element() / f64::from(SIDE);
         let around = Demanded::new(domain, Keeps::Surface, beside.max(margin));
         let deciding = Demanded::new(domain, Keeps::Value, margin);
+        let has_few_leaves = !solid.has_many_leaves();
         let (solid, twin) = (solid.clone(), solid.twin());
-        Some(Self { solid, twin, parts, cells, around, deciding, reach, margin })
+        Some(Self { solid, twin, parts, cells, around, deciding, reach, has_few_leaves, margin })
     }
 
     /// How the box is divided. Cells in which something moves are divided for that, as if all of them were asked for.
@@ -559,12 +561,24 @@ impl Walls for CellMap {
         }
     }
 
+    fn is_outside(&self, over: &Aabb) -> bool {
+        // the cells that a box touches are often more than all leaves
+        self.has_few_leaves && self.parts.leaves.is_negative(&self.parts.words, over)
+            || self.range(over).hi < 0.0
+    }
+
     fn is_far(&self, over: &Aabb, reach: f64) -> bool {
         let domain = self.cells.domain();
         if !(domain.contains(over.min) && domain.contains(over.max)) {
             return self.twin.is_far(over, reach);
         }
         reach <= self.reach && self.cells.is_fluid(over, MOST_TOUCHED)
+    }
+
+    fn surroundings(&self, domain: &Aabb, reach: f64) -> Option<Aabb> {
+        let own = self.cells.domain();
+        let is_known = reach <= self.reach && own.contains(domain.min) && own.contains(domain.max);
+        is_known.then(|| self.cells.occupied())
     }
 
     fn first_entry(&self, path: &Path) -> Option<Entry> {

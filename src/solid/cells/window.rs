@@ -33,6 +33,14 @@ pub(super) struct Found<'a> {
     pub place: u64,
 }
 
+/// The cells of the flat grid that a box touches.
+struct Touched<I> {
+    /// Whether some lie beyond what is occupied. They are fluid.
+    beyond: bool,
+    /// The others, with their numbers along the axes.
+    cells: I,
+}
+
 /// What is known of a cell that may be divided.
 enum Part<'a> {
     Known(Known<'a>),
@@ -63,6 +71,22 @@ impl Window {
 
     pub fn domain(&self) -> Aabb {
         self.cells.domain
+    }
+
+    /// A box that holds all cells of the flat grid but those that are fluid.
+    pub fn occupied(&self) -> Aabb {
+        let [low, high] = self.cells.occupied;
+        if low.cmpgt(high).any() {
+            return Aabb::EMPTY;
+        }
+        let [first, last] = [low, high].map(|at| bounds(&self.cells.domain, DEPTH, at));
+        self.widened(&first.union(&last))
+    }
+
+    /// A box with the points that rounding puts into its cells.
+    fn widened(&self, over: &Aabb) -> Aabb {
+        let largest = over.min.abs().max(over.max.abs()).max_element();
+        over.grown(1e-9 * self.shortest_side(MAX_DEPTH) + 64.0 * f64::EPSILON * largest)
     }
 
     /// Counts all cells. Those in which something moves are divided for that.
@@ -143,15 +167,15 @@ impl Window {
     }
 
     /// Whether a box within the domain touches fluid alone, as far as the flat grid says, and no more than
-    /// `most` of its cells.
+    /// `most` of its cells that are occupied.
     pub fn is_fluid(&self, over: &Aabb, most: usize) -> bool {
         let is_fluid = |(at, cell)| matches!(self.part(cell, at), Part::Known(Known::Fluid));
-        self.touched(over, most).is_some_and(|mut cells| cells.all(is_fluid))
+        self.touched(over, most).is_some_and(|mut touched| touched.cells.all(is_fluid))
     }
 
     /// Visits the undivided cells that a box within the domain touches, and perhaps some beside it, with
-    /// their depths. The visit ends when `visit` breaks. `None` if the box touches more than `most` cells of
-    /// the flat grid.
+    /// their depths: once for all that lie beyond what is occupied. The visit ends when `visit` breaks. `None` if
+    /// the box touches more than `most` cells of the flat grid that are occupied.
     pub fn visit<'a, B>(
         &'a self,
         over: &Aabb,
@@ -159,9 +183,12 @@ impl Window {
         visit: &mut impl FnMut(Known<'a>, u32) -> ControlFlow<B>,
     ) -> Option<ControlFlow<B>> {
         // points that rounding puts into the next cell are in it
-        let largest = over.min.abs().max(over.max.abs()).max_element();
-        let wider = over.grown(1e-9 * self.shortest_side(MAX_DEPTH) + 64.0 * f64::EPSILON * largest);
-        for (at, cell) in self.touched(over, most)? {
+        let wider = self.widened(over);
+        let Touched { beyond, cells } = self.touched(over, most)?;
+        if beyond && let ControlFlow::Break(found) = visit(Known::Fluid, DEPTH) {
+            return Some(ControlFlow::Break(found));
+        }
+        for (at, cell) in cells {
             let found = self.visit_part(self.part(cell, at), (DEPTH, at), &wider, visit);
             if found.is_break() {
                 return Some(found);
@@ -198,26 +225,29 @@ impl Window {
         ControlFlow::Continue(())
     }
 
-    /// The cells of the flat grid that a box within the domain touches, with their numbers along the axes;
-    /// `None` if they are more than `most`.
-    fn touched(&self, over: &Aabb, most: usize) -> Option<impl Iterator<Item = (UVec3, Cell)> + '_> {
+    /// The cells of the flat grid that a box within the domain touches; `None` if more than `most` of them are
+    /// occupied.
+    fn touched(&self, over: &Aabb, most: usize) -> Option<Touched<impl Iterator<Item = (UVec3, Cell)> + '_>> {
         let cells = &*self.cells;
         let number = |p: DVec3| {
             let q = (p - cells.domain.min) * cells.per_length;
             q.clamp(DVec3::ZERO, DVec3::splat(f64::from(SIDE - 1))).as_uvec3()
         };
-        let (low, high) = (number(over.min), number(over.max));
-        let size = high - low + 1;
+        let (first, last) = (number(over.min), number(over.max));
+        let [low, high] = [first.max(cells.occupied[0]), last.min(cells.occupied[1])];
+        let beyond = [low, high] != [first, last];
+        let size = (high + 1).saturating_sub(low);
         if (size.x * size.y * size.z) as usize > most {
             return None;
         }
         let rows = (low.z..=high.z).flat_map(move |z| (low.y..=high.y).map(move |y| (y, z)));
-        Some(rows.flat_map(move |(y, z)| {
+        let cells = rows.flat_map(move |(y, z)| {
             (low.x..=high.x).map(move |x| {
                 let word = cells.grid[((z * SIDE + y) * SIDE + x) as usize];
                 (UVec3::new(x, y, z), Cell::unpack(word))
             })
-        }))
+        });
+        Some(Touched { beyond, cells })
     }
 
     /// The shortest side of a cell.

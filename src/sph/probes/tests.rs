@@ -9,7 +9,7 @@ use crate::field::Walls;
 use crate::sph::Parameters;
 use crate::sph::{
     Dfsph, Method, Obstacle, Paper, Particles, Simulation, Wcsph, scenes,
-    walls::{Boundary, Maps},
+    walls::{Boundary, BroadPhase, Maps},
 };
 
 const G: f64 = 9.81;
@@ -62,6 +62,7 @@ fn state(method: Method, particles: Particles, domain: Aabb) -> Core {
 }
 
 fn state_around(method: Method, particles: Particles, domain: Aabb, obstacles: Vec<Obstacle>) -> Core {
+    let broad_phase = BroadPhase::unknown(obstacles.len());
     let boundary = Boundary {
         domain,
         wall_restitution: 0.5,
@@ -73,6 +74,7 @@ fn state_around(method: Method, particles: Particles, domain: Aabb, obstacles: V
         step: 0.0,
         clearance: 1e-6,
         maps: Maps::default(),
+        broad_phase,
     };
     let mut core = Core::new(water(method), boundary, particles);
     // not the first step: dfsph would move the particles of a start apart

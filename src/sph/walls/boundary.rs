@@ -30,6 +30,7 @@ use crate::sph::{VectorField, contacts::Contacts, particles::Vectors, scales::Sl
 
 use super::{
     behind::Behind,
+    broad_phase::BroadPhase,
     contact::{Trouble, rubbed},
     coverage::Coverage,
     friction::Friction,
@@ -38,7 +39,7 @@ use super::{
 };
 
 /// Number of particles whose paths are first tested together.
-const BLOCK: usize = 128;
+const BLOCK: usize = 32;
 
 /// Number of particles that [`Boundary::mark`] tests together.
 pub(in crate::sph) const MARKED: usize = 32;
@@ -137,6 +138,8 @@ pub(in crate::sph) struct Boundary {
     pub clearance: f64,
     /// What the obstacles take of kernels.
     pub maps: Maps,
+    /// Which obstacles may be near a place.
+    pub broad_phase: BroadPhase,
 }
 
 /// A particle that could not be put anywhere, by its index.
@@ -155,6 +158,10 @@ impl Boundary {
         self.during
             .extend(self.obstacles.iter().map(|o| o.moving.as_ref().map(|moving| moving.during(from, to))));
         self.maps.move_to(from, to);
+        for k in (0..self.obstacles.len()).filter(|k| self.obstacles[*k].moving.is_some()) {
+            let around = self.field(k).surroundings(&self.domain, self.broad_phase.h());
+            self.broad_phase.set(k, around);
+        }
     }
 
     /// The field of an obstacle during the present step.
@@ -192,6 +199,16 @@ impl Boundary {
     /// The fields of all obstacles during the present step.
     pub fn fields(&self) -> impl Iterator<Item = &dyn Walls> {
         (0..self.obstacles.len()).map(|k| self.field(k))
+    }
+
+    /// The obstacles to which a point of a box may be nearer than the support radius.
+    pub(super) fn fields_near(&self, over: &Aabb) -> impl Iterator<Item = &dyn Walls> {
+        self.broad_phase.over(*over).map(|k| self.field(k))
+    }
+
+    /// The obstacles that may be nearer to a place than the support radius.
+    fn fields_at(&self, p: DVec3) -> impl Iterator<Item = &dyn Walls> {
+        self.broad_phase.at(p).map(|k| self.field(k))
     }
 
     /// Moves particles from `position` to `target`, and corrects target and velocity where they collide.
@@ -257,11 +274,12 @@ impl Boundary {
         x.zip(y).zip(z).zip(is_near).with_min_len(64).for_each(|(((x, y), z), is_near)| {
             let block = box_around([x, y, z]);
             let in_box = self.domain.union(&block.grown(h)) == self.domain;
-            *is_near = !(in_box && self.fields().all(|field| field.is_far(&block, h)));
+            *is_near = !(in_box && self.fields_near(&block).all(|field| field.is_far(&block, h)));
         });
     }
 
-    /// Prepares the maps of what obstacles take of kernels with the support radius h, m.
+    /// Prepares what is known for good of the obstacles near kernels with the support radius h, m: the maps of
+    /// what they take, and which of them are near.
     pub fn map_obstacles(&mut self, h: f64) {
         let obstacles: Vec<_> = (self.obstacles.iter())
             .map(|obstacle| Mapped {
@@ -272,6 +290,10 @@ impl Boundary {
             })
             .collect();
         self.maps = Maps::new(&obstacles, &self.domain, h, self.time);
+        let boxes = self.fields().zip(&self.obstacles);
+        let boxes =
+            boxes.map(|(field, obstacle)| (field.surroundings(&self.domain, h), obstacle.moving.is_none()));
+        self.broad_phase = BroadPhase::new(self.domain, h, boxes);
     }
 
     /// The parts of the kernel of a particle that the box and the obstacles take; `None` if they are farther
@@ -289,7 +311,7 @@ impl Boundary {
             whole = whole.with_bodies(wall, &continuous, &taken);
         }
         let (none, nothing) = (Coverage::<(), B>::default(), Coverage::default());
-        for k in 0..self.obstacles.len() {
+        for k in self.broad_phase.at(p) {
             match self.maps.of(k, p) {
                 Known::AtRest | Known::Nothing => {}
                 Known::Taken(taken) => {
@@ -313,7 +335,7 @@ impl Boundary {
             F::default()
         } else {
             let of_box = of_box.without_behind();
-            (0..self.obstacles.len()).fold(of_box, |whole, k| self.with_faces(wall, p, whole, k)).friction
+            self.broad_phase.at(p).fold(of_box, |whole, k| self.with_faces(wall, p, whole, k)).friction
         };
         Some(whole.with_friction(friction))
     }
@@ -407,9 +429,10 @@ impl Boundary {
         let swept = block.swept();
         // if an obstacle moves, a ball that is free now may not be free in the next step
         let at_rest = self.all_at_rest();
-        let most = self.reach();
-        if self.fields().all(|field| field.range(&swept).hi < 0.0) {
-            if at_rest && self.fields().all(|field| field.is_far(&swept, most)) {
+        // maps of cells know nothing beyond the support radius, to which the reach is equal but for rounding
+        let most = self.reach().min(self.broad_phase.h());
+        if self.fields_near(&swept).all(|field| field.is_outside(&swept)) {
+            if at_rest && self.fields_near(&swept).all(|field| field.is_far(&swept, most)) {
                 block.clear.fill(SURELY * most);
             }
             return Ok(());
@@ -419,7 +442,8 @@ impl Boundary {
                 continue;
             }
             let (from, to) = (block.from(k), block.target(k));
-            let free = SURELY * self.fields().map(|field| field.clearance(from, most)).fold(most, f64::min);
+            let free =
+                SURELY * self.fields_at(from).map(|field| field.clearance(from, most)).fold(most, f64::min);
             let left = free - from.distance(to);
             // a particle that does not move needs a proof as well: a wall may reach it
             if free > 0.0 && left >= 0.0 {

@@ -6,7 +6,7 @@ use super::{
     boundary::Boundary,
     contact::{Contact, Undefined, bounce, first_contact_during, push_out, reflect, turn_back},
 };
-use crate::field::Path;
+use crate::{field::Path, geom::Aabb};
 
 /// Maximum number of contacts of one particle in one step. After them it stays where it is.
 const MAX_CONTACTS: usize = 4;
@@ -77,7 +77,8 @@ impl Boundary {
 
     /// Whether no wall that moves passes a place between a part of the step and its end.
     fn stays_outside(&self, here: DVec3, since: f64) -> Result<bool, Undefined> {
-        for (k, obstacle) in self.obstacles.iter().enumerate().filter(|(_, o)| o.moving.is_some()) {
+        for k in self.broad_phase.at(here).filter(|k| self.obstacles[*k].moving.is_some()) {
+            let obstacle = &self.obstacles[k];
             let path = Path { start: since, ..Path::new(here, here, obstacle.resolution) };
             if first_contact_during(self.field(k), &path, self.clearance, self.step)?.is_some() {
                 return Ok(false);
@@ -125,7 +126,8 @@ impl Boundary {
     ) -> Result<Option<(usize, Contact)>, Undefined> {
         let mut nearest: Option<(usize, Contact)> = None;
         let left = 1.0 - since;
-        for (k, obstacle) in self.obstacles.iter().enumerate() {
+        for k in self.broad_phase.over(Aabb::new(here.min(target), here.max(target))) {
+            let obstacle = &self.obstacles[k];
             let mut path = Path::new(here, target, obstacle.resolution);
             let is_late = obstacle.moving.is_some() && since > 0.0;
             if is_late {

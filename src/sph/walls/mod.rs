@@ -3,12 +3,14 @@
 //! ```text
 //! Field::omega ─▶ Maps: λ, ∇λ, K of obstacles by their volume ─▶ Coverage ─▶ density, pressure
 //! Field::faces ─▶ Coverage: λ, ∇λ, K of faces in closed form ─▶ viscosity, and obstacles too large for maps
+//! Walls::surroundings ─▶ BroadPhase: which obstacles may be near a place
 //! Moving::placement ─▶ StepLimits: how long a step may be
 //! Field::first_entry ─▶ Contact ─▶ Boundary::collide: position and velocity
 //! ```
 
 mod behind;
 mod boundary;
+mod broad_phase;
 mod collide;
 mod contact;
 mod corner;
@@ -27,6 +29,7 @@ mod way_out;
 pub(super) use behind::{Behind, Carried};
 pub use boundary::Obstacle;
 pub(super) use boundary::{Boundary, Fault, MARKED, UNKNOWN};
+pub(super) use broad_phase::BroadPhase;
 pub use collide::{Collision, Rebound, collide, put_back};
 pub(super) use contact::Trouble;
 pub use contact::{Contact, Undefined, bounce, first_contact, push_out};

@@ -166,10 +166,10 @@ impl Boundary {
     pub fn moving_near(&self, p: DVec3, h: f64) -> NearMotion {
         let place = Aabb::new(p, p);
         let is_near = |k: &usize| !self.field(*k).is_far(&place, h);
-        let mut moving = (0..self.obstacles.len()).filter(|k| self.obstacles[*k].moves()).filter(is_near);
+        let mut moving = self.broad_phase.at(p).filter(|k| self.obstacles[*k].moves()).filter(is_near);
         let Some(first) = moving.next() else { return NearMotion::Nothing };
         let in_the_open = self.domain.union(&place.grown(h)) == self.domain;
-        let is_alone = in_the_open && !(0..self.obstacles.len()).filter(|k| *k != first).any(|k| is_near(&k));
+        let is_alone = in_the_open && !self.broad_phase.at(p).filter(|k| *k != first).any(|k| is_near(&k));
         if is_alone { NearMotion::Alone(first) } else { NearMotion::BesideOthers(first) }
     }
 
@@ -330,7 +330,7 @@ impl Boundary {
             return found;
         }
         let place = Aabb::new(p, p);
-        for k in 0..self.obstacles.len() {
+        for k in self.broad_phase.at(p) {
             if self.field(k).is_far(&place, wall.h) {
                 continue;
             }

@@ -9,7 +9,7 @@
 
 use glam::DVec3;
 
-use crate::field::Path;
+use crate::{field::Path, geom::Aabb};
 
 use super::{
     boundary::Boundary,
@@ -47,8 +47,8 @@ impl Boundary {
             Some(out) => out,
             None => self.all_around(from, at)?.ok_or(Trouble::NoRoom { at })?,
         };
-        for (k, obstacle) in self.obstacles.iter().enumerate() {
-            let field = self.field(k);
+        for k in self.broad_phase.at(at) {
+            let (obstacle, field) = (&self.obstacles[k], self.field(k));
             if field.omega(at) < 0.0 {
                 continue;
             }
@@ -65,8 +65,8 @@ impl Boundary {
 
     /// The first obstacle that a point lies in.
     fn first_around(&self, at: DVec3) -> Result<Option<usize>, Undefined> {
-        for (k, field) in self.fields().enumerate() {
-            let omega = field.omega(at);
+        for k in self.broad_phase.at(at) {
+            let omega = self.field(k).omega(at);
             if omega.is_nan() {
                 return Err(Undefined { at });
             }
@@ -79,7 +79,7 @@ impl Boundary {
 
     /// Whether a point is in the box, and the straight way to it during the step passes no obstacle.
     fn is_within_reach(&self, from: DVec3, to: DVec3) -> Result<bool, Undefined> {
-        for k in 0..self.obstacles.len() {
+        for k in self.broad_phase.over(Aabb::new(from.min(to), from.max(to))) {
             if !self.is_free(k, from, to)? {
                 return Ok(false);
             }

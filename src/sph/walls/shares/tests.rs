@@ -6,7 +6,7 @@ use super::*;
 use crate::{
     field::{Closures, Walls},
     geom::Aabb,
-    sph::walls::{Obstacle, WallKernel, volume::Maps},
+    sph::walls::{BroadPhase, Obstacle, WallKernel, volume::Maps},
 };
 
 fn sticky(field: impl Walls + 'static) -> Obstacle {
@@ -29,6 +29,7 @@ fn boundary(gap: f64) -> Boundary {
         step: 0.0,
         clearance: 1e-6,
         maps: Maps::new(&[], &Aabb::new(DVec3::ZERO, DVec3::ONE), 1.0, 0.0),
+        broad_phase: BroadPhase::unknown(2),
     }
 }
 
