@@ -53,7 +53,7 @@ impl BroadPhase {
     pub fn new(domain: Aabb, h: f64, obstacles: impl Iterator<Item = (Option<Aabb>, bool)>) -> Self {
         let (boxes, at_rest): (Vec<Option<Aabb>>, Vec<bool>) = obstacles.unzip();
         let has_volume = domain.size().cmpgt(DVec3::ZERO).all() && domain.is_finite();
-        if !has_volume || !(h > 0.0 && h.is_finite()) {
+        if !(has_volume && h > 0.0 && h.is_finite()) {
             return Self::unknown(boxes.len());
         }
         let all: Vec<u32> = (0..boxes.len() as u32).collect();
@@ -180,7 +180,7 @@ mod tests {
         let of = |k: u32| {
             let corner = domain.min + domain.size() * DVec3::new(part(k, 37), part(k, 59), part(k, 83));
             let around = Aabb::new(corner, corner + DVec3::new(0.02, 0.3, 1.1) * part(k, 71));
-            ((k % 7 != 0).then_some(around), k % 3 != 0)
+            ((!k.is_multiple_of(7)).then_some(around), !k.is_multiple_of(3))
         };
         (1..200).map(of).collect()
     }
