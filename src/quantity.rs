@@ -81,6 +81,16 @@ impl Dimension {
         UNITS.into_iter().find(|(dimension, _)| *dimension == self).map(|(_, unit)| unit)
     }
 
+    /// The dimension of a product.
+    pub fn times(self, other: Self) -> Self {
+        self.plus(other, 1)
+    }
+
+    /// The dimension of a quotient.
+    pub fn per(self, other: Self) -> Self {
+        self.plus(other, -1)
+    }
+
     fn plus(self, other: Self, times: i8) -> Self {
         let add = |a: i8, b: i8| a.saturating_add(b.saturating_mul(times));
         Self {

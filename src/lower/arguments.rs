@@ -1,6 +1,7 @@
 //! Calls: arguments are bound to parameters, then the body is evaluated in a scope of its own.
 
 use super::builtins;
+use super::dimensions::Measure;
 use super::foreign;
 use super::lowering::{Call, Local, Lowering, Scope};
 use super::names::Kind;
@@ -120,8 +121,6 @@ impl<'a> Lowering<'a> {
         let mut fits = true;
         let standard = !source.is_users();
         for (position, argument) in arguments.iter().enumerate() {
-            // no parameter of a standard solid is an angle
-            fits &= !standard || function.takes_a_shape() || self.no_angle(&argument.value);
             let value = self.expr(&argument.value);
             let parameter = match self.parameter(function, position, argument) {
                 Parameter::Known(parameter) => parameter,
@@ -134,6 +133,9 @@ impl<'a> Lowering<'a> {
                     return None;
                 }
             };
+            if standard && value != Value::Failed {
+                fits &= self.measures(&argument.value, Measure::of(name, &parameter));
+            }
             if bound.iter().any(|local| local.name == parameter) {
                 let at = self.user_span(argument.value.span);
                 let message = format!("parameter `{parameter}` of `{name}` is given twice");

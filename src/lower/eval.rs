@@ -107,6 +107,9 @@ impl Lowering<'_> {
                 AddOp::Subtract => Binary::Sub,
             };
             self.warn_of_shapes(op, first, operand);
+            if value != Value::Failed && right != Value::Failed && !self.may_be_added(first, operand) {
+                return Value::Failed;
+            }
             value = self.sum(op, &value, &right, first.span.to(operand.span));
         }
         value

@@ -43,8 +43,8 @@ pub(super) struct Lowering<'a> {
     pub without_time: HashSet<SourceId>,
     /// Whether the value of a `let` is read.
     pub in_let: bool,
-    /// Dimensions of the params and names that are defined as one number with a unit.
-    pub dimensions: HashMap<String, Dimension>,
+    /// Dimensions of the params and names of each text whose units tell them.
+    pub dimensions: HashMap<(SourceId, String), Dimension>,
     /// Params and names whose value has neither a unit nor π in it.
     pub bare: HashSet<String>,
     /// The method that all scenes get, whatever they state.

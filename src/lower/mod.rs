@@ -11,6 +11,7 @@ mod builtins;
 mod choice;
 mod columns;
 mod curves;
+mod dimensions;
 mod distances;
 mod eval;
 mod foreign;
@@ -213,7 +214,6 @@ impl<'a> Lowering<'a> {
         }
         self.module.solids.truncate(solids);
         self.qualifier.clear();
-        self.dimensions.clear();
         self.bare.clear();
     }
 
@@ -295,8 +295,9 @@ impl<'a> Lowering<'a> {
 
     /// Remembers which names stand for a number with a unit, and which for one without.
     fn remember_units(&mut self, name: &Name, value: &Expr) {
-        if let Some((unit, _)) = unit_of(value) {
-            self.dimensions.insert(name.text.clone(), unit.dimension);
+        let written = unit_of(value).map(|(unit, _)| unit.dimension);
+        if let Some(dimension) = written.or_else(|| self.derived_dimension(value)) {
+            self.dimensions.insert((self.scope.source, name.text.clone()), dimension);
         }
         if self.is_bare(value) {
             self.bare.insert(name.text.clone());

@@ -3,6 +3,7 @@
 use glam::DVec3;
 
 use super::curves::{self, Flaw, MOST_POINTS};
+use super::dimensions::Measure;
 use super::lowering::Lowering;
 use super::value::Value;
 use crate::diagnostic::{Code, Diagnostic, Span};
@@ -217,6 +218,9 @@ impl Lowering<'_> {
         let mut numbers = [0.0; 2];
         for (i, what) in [(1, "the pitch of a helix"), (2, "the turns of a helix")] {
             let at = arguments[i].value.span;
+            if !self.measures(&arguments[i].value, if i == 1 { Measure::Length } else { Measure::Count }) {
+                return Value::Failed;
+            }
             let node = self.as_number(&values[i], at);
             let Some(known) = node.and_then(|node| self.as_constant(node, at, what)) else {
                 return Value::Failed;
@@ -337,7 +341,7 @@ impl Lowering<'_> {
     /// A constant above zero.
     pub fn above_zero(&mut self, value: &Value, argument: &Argument, what: &str) -> Option<f64> {
         let at = argument.value.span;
-        if !self.no_angle(&argument.value) {
+        if !self.measures(&argument.value, Measure::Length) {
             return None;
         }
         let node = self.as_number(value, at)?;

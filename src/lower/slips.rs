@@ -3,6 +3,7 @@
 
 use rustc_hash::FxHashMap;
 
+use super::dimensions::Measure;
 use super::lowering::Lowering;
 use super::names::{Kind, TIME};
 use crate::diagnostic::{Code, Diagnostic, SourceId, Span};
@@ -281,17 +282,13 @@ impl Lowering<'_> {
     /// in `.rotate_z(w)` after `param w = 30 rpm`.
     pub fn may_be_angle(&mut self, expr: &Expr) -> bool {
         let inner = without_sign(expr);
-        let (dimension, span) = match &inner.kind {
-            ExprKind::Quantity { unit, .. } => (parse_unit(&unit.text).map(|unit| unit.dimension), unit.span),
-            ExprKind::Name(name) => {
-                let is_local = self.scope.locals.iter().any(|local| local.name == *name);
-                (self.dimensions.get(name).copied().filter(|_| !is_local), inner.span)
-            }
-            _ => return true,
+        let span = match &inner.kind {
+            ExprKind::Quantity { unit, .. } => unit.span,
+            _ => inner.span,
         };
         let written = self.written(inner).unwrap_or("w").to_string();
         let sign = if inner.span == expr.span { "" } else { "-" };
-        let (message, help) = match dimension {
+        let (message, help) = match self.dimension(inner) {
             Some(Dimension::LENGTH) => {
                 ("a length is not an angle".into(), "write an angle such as `45 deg` or `0.8 rad`".into())
             }
@@ -304,7 +301,7 @@ impl Lowering<'_> {
                 format!("`{written}` is a rate, not an angle"),
                 format!("write `{sign}2*pi*{written}*t` for a shape that turns so often in a second"),
             ),
-            Some(_) | None => return true,
+            Some(_) | None => return self.measures(expr, Measure::Angle),
         };
         self.report(Diagnostic::error(Code::UNIT_MISMATCH, span, message).help(help));
         false

@@ -3,6 +3,7 @@
 //! A shape S moved by a transformation T has ω(T⁻¹ p): its coordinates are replaced by those of the point
 //! before the transformation. Displacements and angles may depend on time: the shape then moves.
 
+use super::dimensions::Measure;
 use super::lowering::Lowering;
 use super::value::Value;
 use crate::diagnostic::{Code, Diagnostic, Span};
@@ -68,6 +69,19 @@ enum ParameterKind {
     Length,
     /// A number or a vector; anything else has a message of its own.
     Factor,
+}
+
+impl ParameterKind {
+    /// What a parameter of this kind and name measures.
+    fn measure(self, parameter: &str) -> Measure {
+        match (self, parameter) {
+            (Self::Length, _) | (Self::Vector, "by" | "about" | "point" | "step") => Measure::Length,
+            (Self::Vector, "counts") => Measure::Count,
+            (Self::Angle | Self::LocalAngle, _) => Measure::Angle,
+            (Self::Factor, _) => Measure::Factor,
+            (Self::Vector, _) => Measure::Any,
+        }
+    }
 }
 
 impl Transform {
@@ -190,8 +204,12 @@ impl<'a> Lowering<'a> {
                 return self.fail(self.wrong_arguments(method, parameters, arguments, span));
             };
             let value = self.expr(&argument.value);
-            let (_, kind) = parameters[slot];
-            if kind == ParameterKind::Length && !self.no_angle(&argument.value) {
+            let (parameter, kind) = parameters[slot];
+            let measure = kind.measure(parameter);
+            if kind != ParameterKind::Angle
+                && value != Value::Failed
+                && !self.measures(&argument.value, measure)
+            {
                 return Value::Failed;
             }
             if kind == ParameterKind::Angle {

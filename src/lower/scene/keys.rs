@@ -357,7 +357,8 @@ impl<'a> Lowering<'a> {
 
     /// Reports a name that stands for a number with a unit of another kind.
     fn dimension_fits(&mut self, name: &str, expected: Dimension, key: &str, expr: &Expr) -> bool {
-        let Some(found) = self.dimensions.get(name).filter(|found| **found != expected) else { return true };
+        let known = self.dimensions.get(&(self.scope.source, name.to_string()));
+        let Some(found) = known.filter(|found| **found != expected) else { return true };
         let [found, expected] = [found.unit(), expected.unit()];
         let message = match found {
             Some(found) => format!("`{name}` is in {found}, which does not fit `{key}`"),

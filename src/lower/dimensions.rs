@@ -1,0 +1,222 @@
+//! Dimensions of expressions, where units make them known: sums of unlike quantities and arguments of another kind
+//! are reported. Numbers without a unit may stand for anything.
+
+use super::lowering::Lowering;
+use crate::diagnostic::{Code, Diagnostic, SourceId};
+use crate::quantity::{Dimension, parse_unit};
+use crate::syntax::ast::{Expr, ExprKind, MulOp};
+
+/// What an argument of a standard function or of a method measures.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Measure {
+    Length,
+    /// A number of copies, a ratio or a seed.
+    Count,
+    /// Whole turns in a length.
+    TurnsPerLength,
+    /// A factor of coordinates: `.scale(1 mm)` reads a shape in millimetres.
+    Factor,
+    /// An angle, or a formula for one.
+    Angle,
+    /// A shape, a direction or a formula.
+    Any,
+}
+
+impl Measure {
+    /// What a parameter of a standard function measures.
+    pub fn of(function: &str, parameter: &str) -> Self {
+        match (function, parameter) {
+            ("twist", "turns") => Self::TurnsPerLength,
+            ("taper", "top") | ("narrowed", "factor") | ("polar_repeat", "n") | ("noise", "seed") => {
+                Self::Count
+            }
+            (_, "r" | "R" | "h" | "radius" | "thickness" | "d" | "z0" | "z1" | "centre" | "min" | "max")
+            | ("ellipsoid", "a" | "b" | "c")
+            | ("half_space", "point")
+            | ("layer", "low" | "high") => Self::Length,
+            _ => Self::Any,
+        }
+    }
+
+    /// Whether a quantity of this dimension may stand here.
+    fn admits(self, found: Dimension) -> bool {
+        let is_plain = found == Dimension::NONE;
+        match self {
+            Self::Any => true,
+            Self::Count => is_plain,
+            Self::TurnsPerLength => is_plain || found == Dimension::PER_LENGTH,
+            Self::Factor => is_plain || found == Dimension::LENGTH,
+            // an angle times a length is the length of an arc
+            Self::Length => is_plain || without_angle(found) == Dimension::LENGTH,
+            Self::Angle => is_plain || found == Dimension::ANGLE,
+        }
+    }
+
+    /// What is asked for, and how it is written.
+    fn wanted(self) -> (&'static str, &'static str) {
+        match self {
+            Self::Length => ("a length", "write a length such as `1`, `2 cm` or `5 mm`"),
+            Self::Count => ("a plain number", "write a number without a unit"),
+            Self::TurnsPerLength => (
+                "a number of turns per metre",
+                "write turns per metre, as in `.twist(0.25)`, which turns by 90° from z = 0 to z = 1 m",
+            ),
+            Self::Factor => ("a factor", "write a number without a unit, as in `.scale(2)`"),
+            Self::Angle => ("an angle", "write an angle such as `45 deg` or `0.8 rad`"),
+            Self::Any => ("a shape", ""),
+        }
+    }
+}
+
+impl Lowering<'_> {
+    /// The dimension of an expression, as far as its units tell; `None` if it may be anything.
+    pub fn dimension(&self, expr: &Expr) -> Option<Dimension> {
+        match &expr.kind {
+            ExprKind::Quantity { unit, .. } => parse_unit(&unit.text).map(|unit| unit.dimension),
+            ExprKind::Name(name) => {
+                let is_local = self.scope.locals.iter().any(|local| local.name == *name);
+                let key = (self.scope.source, name.clone());
+                self.dimensions.get(&key).copied().filter(|_| !is_local)
+            }
+            ExprKind::Negate(inner) => self.dimension(inner),
+            ExprKind::Sum { first, rest } => {
+                let mut terms = std::iter::once(&**first).chain(rest.iter().map(|(_, term)| term));
+                terms.find_map(|term| self.dimension(term).filter(|found| *found != Dimension::NONE))
+            }
+            ExprKind::Product { first, rest } => {
+                rest.iter().try_fold(self.factor_dimension(first)?, |so_far, (op, factor)| {
+                    let factor = self.factor_dimension(factor)?;
+                    Some(match op {
+                        MulOp::Multiply => so_far.times(factor),
+                        MulOp::Divide => so_far.per(factor),
+                    })
+                })
+            }
+            ExprKind::Choice { values, .. } => {
+                let [first, second] = values.each_ref().map(|value| self.dimension(value));
+                first.filter(|first| second == Some(*first))
+            }
+            ExprKind::Call { function, arguments } => match function.text.as_str() {
+                "abs" | "min" | "max" | "clamp" | "hypot" => {
+                    arguments.iter().find_map(|argument| self.dimension(&argument.value))
+                }
+                _ => None,
+            },
+            ExprKind::Number(_)
+            | ExprKind::Text(_)
+            | ExprKind::Vector(_)
+            | ExprKind::Logic { .. }
+            | ExprKind::Not(_)
+            | ExprKind::Compare { .. }
+            | ExprKind::Power { .. }
+            | ExprKind::Component { .. }
+            | ExprKind::Member { .. }
+            | ExprKind::Method { .. }
+            | ExprKind::Index { .. }
+            | ExprKind::Fold { .. } => None,
+        }
+    }
+
+    /// The dimension of a param or name that is made of other quantities, if it is one that shapes have. A plain
+    /// number in a product may stand for a quantity, so nothing is concluded for speeds and pressures.
+    pub fn derived_dimension(&self, value: &Expr) -> Option<Dimension> {
+        const SIMPLE: [Dimension; 4] =
+            [Dimension::LENGTH, Dimension::ANGLE, Dimension::TIME, Dimension::MASS];
+        self.dimension(value).filter(|found| SIMPLE.contains(found))
+    }
+
+    /// The dimension of a factor. Small whole numbers, their halves and π count; other plain numbers may stand for
+    /// a quantity in SI units, as 1000 does for the density of water.
+    fn factor_dimension(&self, factor: &Expr) -> Option<Dimension> {
+        const LARGEST_COUNT: f64 = 9.0;
+        match &factor.kind {
+            ExprKind::Number(number) if (2.0 * number).fract() == 0.0 && number.abs() <= LARGEST_COUNT => {
+                Some(Dimension::NONE)
+            }
+            ExprKind::Name(name) if name == "pi" => Some(Dimension::NONE),
+            _ => self.dimension(factor),
+        }
+    }
+
+    /// Whether two terms may be added, as far as their units tell. If not, this is reported.
+    pub fn may_be_added(&mut self, first: &Expr, second: &Expr) -> bool {
+        let (Some(a), Some(b)) = (self.dimension(first), self.dimension(second)) else { return true };
+        let is_plain = a == Dimension::NONE || b == Dimension::NONE;
+        if is_plain || a == b || (without_angle(a) == without_angle(b) && without_angle(a) != Dimension::NONE)
+        {
+            return true;
+        }
+        let [kind_a, kind_b] = [a, b].map(kind);
+        let message = format!("{kind_a} and {kind_b} have no sum");
+        let help = if [a, b].contains(&Dimension::ANGLE) && [a, b].contains(&Dimension::LENGTH) {
+            "an angle times a radius is a length, as in `2 mm + 30 deg*5 mm`"
+        } else {
+            "is another name or unit meant? numbers without a unit may be added to anything"
+        };
+        self.report(
+            Diagnostic::error(Code::UNIT_MISMATCH, second.span, message)
+                .at(kind_b)
+                .label(first.span, kind_a)
+                .help(help),
+        );
+        false
+    }
+
+    /// Whether an argument may measure what is asked for, as far as its units tell. If not, this is reported. Of a
+    /// vector, each component is looked at.
+    pub fn measures(&mut self, expr: &Expr, wanted: Measure) -> bool {
+        if let ExprKind::Vector(parts) = &expr.kind {
+            return parts.iter().all(|part| self.measures(part, wanted));
+        }
+        let Some(found) = self.dimension(expr).filter(|found| !wanted.admits(*found)) else { return true };
+        if expr.span.source == SourceId::Prelude {
+            return true;
+        }
+        let (what, help) = wanted.wanted();
+        let message = format!("{} is not {what}", kind(found));
+        let turns = match &expr.kind {
+            ExprKind::Quantity { value, unit } => parse_unit(&unit.text)
+                .map(|unit| (value * unit.factor / std::f64::consts::TAU * 1e6).round() / 1e6),
+            _ => None,
+        };
+        let help = match (wanted, found) {
+            (Measure::TurnsPerLength, Dimension::ANGLE) => match (turns, self.written(expr)) {
+                (Some(turns), Some(angle)) => {
+                    format!("it takes turns per metre: write `.twist({turns})` for `{angle}` in each metre")
+                }
+                _ => help.to_string(),
+            },
+            (Measure::Length, Dimension::ANGLE) => format!("{help}; angles belong to `.rotate_z(45 deg)`"),
+            (Measure::TurnsPerLength, Dimension::LENGTH) => match self.written(expr) {
+                Some(pitch) => format!("for a whole turn in each `{pitch}`, write `.twist(1/({pitch}))`"),
+                None => help.to_string(),
+            },
+            _ => help.to_string(),
+        };
+        self.report(Diagnostic::error(Code::UNIT_MISMATCH, expr.span, message).help(help));
+        false
+    }
+}
+
+/// A dimension in which angles are plain numbers.
+fn without_angle(dimension: Dimension) -> Dimension {
+    Dimension { angle: 0, ..dimension }
+}
+
+/// What a quantity of a dimension is called in messages, with its article.
+fn kind(dimension: Dimension) -> String {
+    match dimension {
+        Dimension::NONE => "a plain number".into(),
+        Dimension::LENGTH => "a length".into(),
+        Dimension::ANGLE => "an angle".into(),
+        Dimension::TIME => "a time".into(),
+        Dimension::MASS => "a mass".into(),
+        Dimension::SPEED => "a speed".into(),
+        Dimension::FREQUENCY => "a rate".into(),
+        Dimension::TURN_RATE => "a rate of turning".into(),
+        other => match other.unit() {
+            Some(unit) => format!("a quantity in {unit}"),
+            None => "a quantity of another kind".into(),
+        },
+    }
+}
