@@ -74,6 +74,7 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>) -> ExitCode {
                 anstream::eprint!("{}", printable(&error.render().to_string()));
                 return ExitCode::from(2);
             }
+            let error = with_known_words(error);
             // clap reports help and version as errors; printing them fails only if standard output is closed
             let _ = error.print();
             if let Some(hint) = hint(&error) {
@@ -84,6 +85,27 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>) -> ExitCode {
     };
     outlive_size_limits();
     command(arguments).map_or_else(Failure::report, |()| ExitCode::SUCCESS)
+}
+
+/// The error with the flag or command that is meant by a word of other programs, in place of one that merely looks
+/// like it.
+fn with_known_words(mut error: clap::Error) -> clap::Error {
+    let text = |error: &clap::Error, kind| match error.get(kind) {
+        Some(ContextValue::String(text)) => Some(text.clone()),
+        _ => None,
+    };
+    let word = text(&error, ContextKind::InvalidSubcommand);
+    if let Some(command) = word.and_then(|word| elsewhere(&word)) {
+        let name = command.split(' ').next().unwrap_or(command).to_string();
+        error.insert(ContextKind::SuggestedSubcommand, ContextValue::Strings(vec![name]));
+    }
+    let flag = text(&error, ContextKind::InvalidArg);
+    if matches!(flag.as_deref(), Some("--resolution" | "--res" | "--grid")) {
+        error.insert(ContextKind::SuggestedArg, ContextValue::String("--cells".into()));
+        // it shows the flag that merely looks alike
+        error.remove(ContextKind::Usage);
+    }
+    error
 }
 
 /// What there is to say to arguments that are none, beyond a similar flag.

@@ -33,7 +33,8 @@ impl<'a> Lowering<'a> {
                 if self.names.defined_later(self.scope.source, &name.text).is_none()
                     && let Some(foreign) = self.foreign_function(name, arguments)
                 {
-                    return self.fail(foreign);
+                    let mixed = self.mix_of_shapes(name, arguments);
+                    return self.fail(mixed.unwrap_or(foreign));
                 }
                 let mut candidates = self.names.candidates(self.scope.source, true);
                 candidates.extend(builtins::names().map(String::from));
@@ -151,6 +152,7 @@ impl<'a> Lowering<'a> {
             let bare = self.is_bare(&argument.value);
             bound.push(Local { name: parameter, value, span: at, bare });
         }
+        fits &= !standard || !self.exchanged((function, arguments), &bound);
         fits &=
             !standard || function.takes_a_shape() || self.kinds_of_arguments_fit(function, arguments, &bound);
         for parameter in &function.parameters {
@@ -161,6 +163,38 @@ impl<'a> Lowering<'a> {
             }
         }
         fits.then_some(bound)
+    }
+
+    /// Whether a number stands where a function takes its shape, and a shape where it takes a number, as in
+    /// `shell(0.1, sphere(1))`, which is reported.
+    fn exchanged(&mut self, (function, arguments): (&Function, &[Argument]), bound: &[Local]) -> bool {
+        let name = &function.name.text;
+        let Some(first) = function.parameters.first().map(|p| &p.name.text) else { return false };
+        if Measure::of(name, first) != Measure::Any
+            || matches!(name.as_str(), "layer" | "noise" | "half_space")
+        {
+            return false;
+        }
+        let value = |local: &Local| match local.value {
+            Value::Number(node) => Some(node),
+            _ => None,
+        };
+        let Some(given) = bound.iter().find(|local| local.name == *first) else { return false };
+        let is_constant = value(given).is_some_and(|node| self.known_value(node).is_some());
+        let is_shape = |local: &&Local| {
+            Measure::of(name, &local.name) != Measure::Any
+                && value(local).is_some_and(|node| self.depends_on_place(node))
+        };
+        let Some(shape) = bound.iter().find(is_shape).filter(|_| is_constant) else { return false };
+        let message = format!("`{}` of `{name}` is a number, found a shape", shape.name);
+        let written: Vec<Option<&str>> = arguments.iter().map(|a| self.written(&a.value)).collect();
+        let call = match written[..] {
+            [Some(number), Some(shape)] => format!("{name}({shape}, {number})"),
+            _ => example(name).unwrap_or("sphere(1).shell(0.1)").to_string(),
+        };
+        let help = format!("its parameters are {}: write `{call}`", signature(function));
+        self.report(Diagnostic::error(Code::WRONG_TYPE, shape.span, message).help(help));
+        true
     }
 
     /// Reports a number given to a standard solid where it takes a vector, and the other way round.

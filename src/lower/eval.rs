@@ -4,6 +4,7 @@ use super::builtins;
 use super::foreign;
 use super::lowering::Lowering;
 use super::names::{Kind, TIME};
+use super::slips::names_a_coordinate;
 use super::value::Value;
 use crate::diagnostic::{Code, Diagnostic, SourceId, Span};
 use crate::ir::{Axis, Binary, BinaryFunction, Node, Unary};
@@ -216,6 +217,14 @@ impl Lowering<'_> {
                                 "a name means what was defined above it: move this line down, or that one up",
                             )
                         }
+                        (None, Some(_)) if self.against_place && matches!(name, "r" | "R") => {
+                            diagnostic.at("not defined above").help(format!(
+                                "define it above: write `let {name} = 1`, or `param {name} = 1` for what `-D {name}=2` may set"
+                            ))
+                        }
+                        (None, None) if name.len() > 1 && parse_unit(name).is_some() => diagnostic
+                            .at("a unit stands behind a number")
+                            .help(format!("write `1 {name}`")),
                         (None, Some(help)) => diagnostic.at("not defined above").help(help),
                         (None, None) => diagnostic.at("not defined above").suggest(name, all),
                     };
@@ -356,8 +365,17 @@ impl Lowering<'_> {
             return self
                 .fail(Diagnostic::error(Code::CHAIN, span, message).help("join the comparisons with `and`"));
         }
-        let mut terms = vec![self.field(first)];
-        terms.extend(rest.iter().map(|(_, _, operand)| self.field(operand)));
+        let operands: Vec<&Expr> = std::iter::once(first).chain(rest.iter().map(|(_, _, e)| e)).collect();
+        let places: Vec<bool> = operands.iter().map(|operand| names_a_coordinate(operand)).collect();
+        let has_place = places.contains(&true);
+        let terms: Vec<Option<Node>> = std::iter::zip(operands, places)
+            .map(|(operand, place)| {
+                let outer = std::mem::replace(&mut self.against_place, has_place && !place);
+                let node = self.field(operand);
+                self.against_place = outer;
+                node
+            })
+            .collect();
         let Some(mut terms) = terms.into_iter().collect::<Option<Vec<Node>>>() else { return Value::Failed };
         if !upwards(rest[0].0) {
             terms.reverse();

@@ -40,6 +40,30 @@ impl Lowering<'_> {
         }
     }
 
+    /// The message for `math.pi` and the like; `None` if something here has the name of the module.
+    pub fn value_of_a_module(&self, module: &Expr, name: &Name) -> Option<Diagnostic> {
+        let diagnostic = self.function_of_a_module(module, name, &[])?;
+        let help = if name.text == "pi" { Some("write `pi`") } else { value(&name.text) };
+        help.map(|help| diagnostic.at("values stand alone here").help(help))
+    }
+
+    /// The message for `mix(a, b, 0.5)` of two shapes.
+    pub fn mix_of_shapes(&mut self, name: &Name, arguments: &[Argument]) -> Option<Diagnostic> {
+        let [first, second, ..] = arguments else { return None };
+        if !matches!(name.text.as_str(), "mix" | "lerp")
+            || !self.is_shape(&first.value)
+            || !self.is_shape(&second.value)
+        {
+            return None;
+        }
+        let [a, b] = [(first, "a"), (second, "b")]
+            .map(|(argument, other)| self.written(&argument.value).unwrap_or(other).to_string());
+        let message = format!("unknown function or shape `{}`", name.text);
+        Some(Diagnostic::error(Code::UNKNOWN_NAME, name.span, message).at("there is no shape between two").help(
+            format!("to join them smoothly, write `smooth_or({a}, {b}, 0.1)`; `.loft` leads from one outline to another"),
+        ))
+    }
+
     /// The message for a method that other tools have; `None` if the name is not known from there.
     pub fn foreign_method(
         &self,
@@ -73,6 +97,9 @@ pub(super) fn value(name: &str) -> Option<&'static str> {
         "X" => "write `x`",
         "Y" => "write `y`",
         "Z" => "write `z`",
+        "auto" | "automatic" | "default" => {
+            "leave the key out: what is chosen then is told by `rfm explain KEY`"
+        }
         "r" | "R" => "write `sqrt(x^2 + y^2)`, or define it: `let r = sqrt(x^2 + y^2)` above",
         "theta" | "phi" => "write `atan2(y, x)`",
         "T" | "time" | "now" => "write `t`, the time in seconds",
@@ -222,19 +249,39 @@ fn transformed(name: &str, a: &[&str]) -> Option<Words> {
     let what = format!("a method here: `shape.{method}(…)`");
     let call = match a {
         [] => None,
-        [shape, how] if how.starts_with('[') || method.starts_with("rotate_") => Some((*shape, *how)),
-        [how, shape] => Some((*shape, *how)),
-        [how] => Some(("sphere(1)", *how)),
-        [_, _, ..] => None,
+        [how] => Some(("sphere(1)".to_string(), how.to_string())),
+        [_, _, ..] => shape_and_rest(a),
     };
     let example = match call {
-        Some((shape, how)) => format!("{shape}{}", foreign::method_call(name, how)?),
+        Some((shape, how)) => match how.rsplit_once("], ") {
+            // an axis or a normal, and then an angle or a point
+            Some((first, second)) => format!("{shape}.{method}({first}], {})", foreign::in_degrees(second)),
+            None if method == "rotate" && how.contains(',') && !how.starts_with('[') => {
+                format!("{shape}{}", foreign::turned(&format!("[{how}]")))
+            }
+            None => format!("{shape}{}", foreign::method_call(name, &how)?),
+        },
         None => format!(
             "sphere(1){}",
             foreign::method_call(name, if method == "scale" { "2" } else { "[1, 0, 0]" })?
         ),
     };
     Some(Words { what, help: format!("write `{example}`") })
+}
+
+/// The shape among the arguments of a transformation, and the others as they were written; `None` if it is not plain
+/// which of them is the shape.
+fn shape_and_rest(a: &[&str]) -> Option<(String, String)> {
+    let is_amount = |text: &&str| text.starts_with(|c: char| c.is_ascii_digit() || "[-.(".contains(c));
+    let shapes: Vec<usize> = (0..a.len()).filter(|i| !is_amount(&a[*i])).collect();
+    let at = match (&shapes[..], a) {
+        ([only], _) => *only,
+        // both are names or formulas: the shape comes first here and last in OpenSCAD; a call is rarely an amount
+        ([_, _], [first, second]) => usize::from(second.ends_with(')') || !first.ends_with(')')),
+        _ => return None,
+    };
+    let rest: Vec<&str> = a.iter().enumerate().filter(|(i, _)| *i != at).map(|(_, text)| *text).collect();
+    Some((foreign::operand(a[at]), rest.join(", ")))
 }
 
 /// Whether an argument is a number or a formula that may be repeated elsewhere: no name is given to it, and

@@ -63,6 +63,9 @@ impl<'a> Lowering<'a> {
     /// `chess.pawn`
     pub fn member(&mut self, of: &Expr, name: &Name) -> Value {
         let Some((file, source)) = self.import_of(of) else {
+            if let Some(foreign) = self.value_of_a_module(of, name) {
+                return self.fail(foreign);
+            }
             let value = self.expr(of);
             if value == Value::Failed {
                 return Value::Failed;

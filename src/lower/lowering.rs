@@ -37,6 +37,8 @@ pub(super) struct Lowering<'a> {
     pub files: Files,
     /// Whether the value of a solid is being evaluated, where only lengths and angles have units.
     pub in_shape: bool,
+    /// Whether one side of a comparison is evaluated whose other side has coordinates in it.
+    pub against_place: bool,
     /// Whether a scene is being read.
     pub in_scene: bool,
     /// The files that give the name of the time to a value of theirs.
@@ -104,6 +106,7 @@ impl Lowering<'_> {
             qualifier: String::new(),
             files: Files::default(),
             in_shape: false,
+            against_place: false,
             in_scene: false,
             without_time: HashSet::new(),
             in_let: false,

@@ -156,7 +156,7 @@ impl Lowering<'_> {
 
     /// Whether an expression is written as a shape: a standard solid, a moved one, a solid's name, a
     /// comparison, or shapes joined.
-    fn is_shape(&mut self, expr: &Expr) -> bool {
+    pub fn is_shape(&mut self, expr: &Expr) -> bool {
         if expr.span.source != SourceId::File {
             return false;
         }
@@ -334,6 +334,12 @@ impl Lowering<'_> {
             _ => format!(".{method}(45 deg)"),
         }
     }
+}
+
+/// Whether a coordinate stands in an expression.
+pub(super) fn names_a_coordinate(expr: &Expr) -> bool {
+    let is_one = matches!(&expr.kind, ExprKind::Name(name) if matches!(name.as_str(), "x" | "y" | "z"));
+    is_one || expr.children().into_iter().any(names_a_coordinate)
 }
 
 fn without_sign(expr: &Expr) -> &Expr {

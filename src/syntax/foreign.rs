@@ -75,9 +75,9 @@ pub fn method(name: &str) -> Option<&'static str> {
         "translate" | "translated" | "trans" | "shift" | "shifted" | "displace" | "moved" | "offset_by"
         | "move" | "moveTo" | "transformed" => "move",
         "rotated" | "rotate" | "rot" | "turn" => "rotate",
-        "rotateX" | "rotx" | "rotX" | "rot_x" | "rotate_X" | "rotateAboutX" => "rotate_x",
-        "rotateY" | "roty" | "rotY" | "rot_y" | "rotate_Y" => "rotate_y",
-        "rotateZ" | "rotz" | "rotZ" | "rot_z" | "rotate_Z" => "rotate_z",
+        "rotate_x" | "rotateX" | "rotx" | "rotX" | "rot_x" | "rotate_X" | "rotateAboutX" => "rotate_x",
+        "rotate_y" | "rotateY" | "roty" | "rotY" | "rot_y" | "rotate_Y" => "rotate_y",
+        "rotate_z" | "rotateZ" | "rotz" | "rotZ" | "rot_z" | "rotate_Z" => "rotate_z",
         "scaled" | "scale" | "resize" => "scale",
         "mirrored" | "mirror" | "reflect" | "flip" => "mirror",
         _ => return None,
@@ -130,6 +130,28 @@ pub fn operand(text: &str) -> String {
     });
     if is_one { text.to_string() } else { format!("({text})") }
 }
+
+/// Names of units that are written in full and often misspelt.
+pub const UNITS_IN_FULL: [&str; 18] = [
+    "meter",
+    "metre",
+    "meters",
+    "millimeter",
+    "millimetre",
+    "millimeters",
+    "centimeter",
+    "centimetre",
+    "centimeters",
+    "degree",
+    "degrees",
+    "radian",
+    "second",
+    "seconds",
+    "millisecond",
+    "kilogram",
+    "newton",
+    "pascal",
+];
 
 /// A quantity with a unit of this language for one with a unit that it does not have.
 pub fn quantity(number: &str, word: &str) -> Option<String> {
@@ -204,12 +226,15 @@ pub fn key(word: &str) -> Option<&'static str> {
         "c" | "c0" | "speed_of_sound" => "sound_speed",
         "end" | "end_time" | "t_end" | "tmax" | "duration" | "time" | "stop" => "until",
         "timestep" | "time_step" | "step" => "dt",
-        "output" | "save" | "interval" | "output_interval" | "frames" | "write_every" => "save_every",
+        "output" | "save" | "interval" | "output_interval" | "write_interval" | "frames" | "write_every" => {
+            "save_every"
+        }
         "domain" | "bounds" | "tank" => "box",
         "vessel" | "bowl" => "container",
         "rigid" | "body" | "object" | "solid" | "obstacles" => "obstacle",
         "liquid" | "water" | "fluids" => "fluid",
-        "kernel" | "scheme" | "sph" => "method",
+        "scheme" | "sph" => "method",
+        "alpha" => "artificial_viscosity",
         "shape" | "name" => "solid",
         "region" | "geometry" | "block" => "shape",
         "sensor" | "gauge" | "measure" => "probe",

@@ -389,6 +389,7 @@ impl<'t> Slip<'t> {
             "'" | "“" | "”" | "„" | "«" | "‘" => "a text stands in double quotes: `\"…\"`",
             "∪" => "shapes are joined by `or` or `∨`: write `a or b`",
             "∩" => "shapes are cut by `and` or `∧`: write `a and b`",
+            "≠" => "that would leave out a surface of zero thickness: write `a <= b` or `a >= b`",
             "√" => "a root is written `sqrt(2)`",
             "%" if number_ends(before) => "a percentage is written as a number: `0.1` for 10 %",
             "%" => foreign::REMAINDER,

@@ -110,6 +110,33 @@ const WORDS: &[&str] = &[
     "solid box = sphere(1)\nsolid s = box([0, 0, 0], [1, 1, 1])",
     "solid s = square(10, center=true)",
     "solid s = cube([1, 2, 3], center=true)",
+    "solid s = scale(sphere(1), 2)",
+    "solid s = rotate(sphere(1).move([1, 0, 0]), [0, 0, 1], 30°)",
+    "solid s = rotate_z(sphere(1), 30 deg)",
+    "solid s = mix(sphere(1), box(), 0.5)",
+    "solid s = x^2 + y^2 <= R^2",
+    "solid s = sphere(5 milimeter)",
+    "solid s = shell(0.1, sphere(1))",
+    "solid s = offset(0.1, sphere(1))",
+    "param r = 1 [0.1, 5]",
+    "param r: float = 1",
+    "solid s = mesh(\"part.stl\", mm)",
+    "solid s = x ≠ 0",
+];
+
+/// Units where they do not fit.
+const UNITS: &[&str] = &[
+    "solid s = box().twist(90 deg)",
+    "solid s = polygon([[0, 0], [2, 0], [1, 1]]).extrude(0, 10 deg)",
+    "solid s = sphere(2 mm + 30 deg)",
+    "param w = 5 s\nparam m = 3 kg\nsolid s = sphere(w + m)",
+    "param w = 5 s\nsolid s = sphere(w)",
+    "param r = 5 mm\nlet d = 2*r\nsolid s = sphere(1).rotate_z(d)",
+    "solid s = box().taper(1, 5 mm)",
+    "solid s = sphere(1).polar_repeat(5 mm)",
+    "solid s = sphere(1).scale(30 deg)",
+    "solid s = sphere(1).turned(2 mm)",
+    "solid s = sweep([helix(1, 30 deg, 3)], 0.1)",
 ];
 
 /// Choices, lists, maps of space, profiles and joints.
@@ -298,6 +325,12 @@ const SCENE: [(&str, &str); 5] = [
 ];
 
 const SCENES: &[&str] = &[
+    "obstacle sphere(0.1)",
+    "gravity: [0 0 -9.81]",
+    "run { until: 1 s, dt: auto }",
+    "run { until: 1 s, write_interval: 0.1 s }",
+    "kernel: wendland",
+    "fluid { shape: box([-5, 0.45, 0.5], [1, 0.55, 0.9]), spacing: 2 cm }",
     "gravity: off",
     "fluid { shape: ball([0.5, 0.5, 0.7], 0.2), spacing: 5 cm, viscosity: 1 mPas\n}",
     "fluid { shape: ball([0.5, 0.5, 0.7], 0.2), viscosity: 1 cPs\nspacing: 5 cm }",
@@ -509,6 +542,23 @@ fn signs_of_other_languages() {
 #[test]
 fn arguments_angles_and_what_is_rarely_meant() {
     read("values", alone(VALUES));
+}
+
+#[test]
+fn units_that_do_not_fit() {
+    read("units", alone(UNITS));
+    // lengths of arcs, plain numbers, and products in which a plain number stands for a quantity
+    for text in [
+        "param r = 5 mm\nparam a = 30 deg\nsolid s = sphere(r*a + 2 mm + r/r)",
+        "let p = 1000*9.81 m/s^2*0.1 m\nlet q = p + 5 kPa\nlet _r = q\nsolid s = sphere(1)",
+        "solid s = box().twist(1/(2 m))",
+        "param s = 5 mm\nparam k = 20\nsolid s1 = box().rotate_z(k*s)",
+        "solid s = box().scale(1 mm)",
+        "fn part(w) = sphere(w + 2 mm)\nsolid s = part(1)",
+    ] {
+        let found = messages(text);
+        assert!(!found.has_errors(), "{text}: {found}");
+    }
 }
 
 #[test]

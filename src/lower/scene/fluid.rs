@@ -130,7 +130,13 @@ impl<'a> Lowering<'a> {
         let Some(method) = method else {
             // the method is unknown, so the keys of all methods are accepted
             let all = Method::all().into_iter().flat_map(names);
-            return key_names(of_every_method).chain(all).collect();
+            let mut known: Vec<&'static str> = Vec::new();
+            for key in key_names(of_every_method).chain(all) {
+                if !known.contains(&key) {
+                    known.push(key);
+                }
+            }
+            return known;
         };
         let known: Vec<&'static str> = key_names(of_every_method).chain(names(method)).collect();
         for entry in entries {

@@ -16,8 +16,14 @@ use crate::syntax::foreign;
 const DYNAMIC: &str =
     "`viscosity` is the dynamic one, that is the kinematic one times the density: water has `1e-3 Pa·s`";
 
+/// What there is to say to a kernel by name.
+const KERNEL: &str = "each method has its own kernel, which cannot be chosen; how far it reaches is the `support_radius` of the fluid";
+
 /// Keys that other programs have in a block and this one does not, each with what takes its place.
-const ABSENT: [(&str, &[&str], &str); 6] = [
+const ABSENT: [(&str, &[&str], &str); 9] = [
+    ("a fluid", &["kernel"], KERNEL),
+    ("a solver", &["kernel"], KERNEL),
+    ("a scene", &["kernel"], KERNEL),
     (
         "a run",
         &["fps", "frame_rate", "framerate"],

@@ -14,10 +14,16 @@ impl Slip<'_> {
             "|" => self.absolute_value(),
             "{" => self.function_in_braces(),
             "," => self.two_variables(),
-            "(" => self.fold_as_a_call().or_else(|| self.function_by_let()),
+            "(" => self
+                .fold_as_a_call()
+                .or_else(|| self.function_by_let())
+                .or_else(|| self.obstacle_by_a_shape()),
+            "[" => self.range_in_brackets(),
+            ":" => self.type_of_a_param(),
             "-" => self.name_with_a_dash(),
             "." => self.box_as_a_range(),
             "}" => self.block_without_a_key(),
+            found if found.starts_with(|c: char| c.is_ascii_digit()) => self.vector_without_commas(),
             _ => None,
         }
     }
@@ -133,6 +139,53 @@ impl Slip<'_> {
             Diagnostic::error(Code::SYNTAX, span, format!("`{block}` has no block"))
                 .at("expected `{`")
                 .help(format!("write `{written}`"))
+        })
+    }
+
+    /// `param r = 1 [0.1, 5]`
+    fn range_in_brackets(&self) -> Option<Diagnostic> {
+        let param = self.on_its_line().trim();
+        let (inner, _) = self.after().lines().next()?.split_once(']')?;
+        let (low, high) = inner.split_once([',', ';'])?;
+        (param.starts_with("param ") && param.contains('=') && fits(&[param, inner])).then(|| {
+            let (low, high) = (low.trim(), high.trim());
+            self.unexpected().help(format!("a range follows `in`: write `{param} in {low} .. {high}`"))
+        })
+    }
+
+    /// `param r: float = 1`
+    fn type_of_a_param(&self) -> Option<Diagnostic> {
+        let head = self.on_its_line().trim();
+        let (_, value) = self.after().lines().next()?.split_once('=')?;
+        let (item, name) = head.split_once(' ')?;
+        let is_head = ["param", "let", "solid"].contains(&item) && last_word(name) == name.trim();
+        (is_head && fits(&[name, value])).then(|| {
+            self.unexpected().help(format!("values have no types: write `{head} = {}`", value.trim()))
+        })
+    }
+
+    /// `[0 0 -9.81]`
+    fn vector_without_commas(&self) -> Option<Diagnostic> {
+        let (_, first) = self.on_its_line().rsplit_once('[')?;
+        let (rest, _) = self.text[self.at..].lines().next()?.split_once(']')?;
+        let parts: Vec<&str> = first.split_whitespace().chain(rest.split_whitespace()).collect();
+        let are_numbers = parts.len() > 1 && parts.iter().all(|part| part.parse::<f64>().is_ok());
+        are_numbers.then(|| {
+            let vector = parts.join(", ");
+            self.unexpected().help(format!("commas separate the parts of a vector: write `[{vector}]`"))
+        })
+    }
+
+    /// `obstacle sphere(0.1)`
+    fn obstacle_by_a_shape(&self) -> Option<Diagnostic> {
+        let (block, called) = self.on_its_line().trim().rsplit_once(' ')?;
+        let block = last_word(block);
+        let shape = format!("{called}({})", bracketed(&self.text[self.at..])?);
+        let is_call = ["obstacle", "container"].contains(&block) && last_word(called) == called;
+        (is_call && self.in_braces() && fits(&[&shape])).then(|| {
+            self.unexpected().help(format!(
+                "a solid has a name: write `solid post = {shape}` above the scene, and `{block} {{ solid: post }}` here"
+            ))
         })
     }
 

@@ -2,7 +2,7 @@
 
 use super::super::foreign;
 use super::{Slip, fits, last_part, last_word, number_ends};
-use crate::diagnostic::{Code, Diagnostic, Span};
+use crate::diagnostic::{Code, Diagnostic, Span, nearest};
 use crate::quantity::parse_unit;
 
 impl Slip<'_> {
@@ -36,6 +36,11 @@ impl Slip<'_> {
         if word.starts_with('_') {
             let digits: String = word.chars().filter(|c| *c != '_').collect();
             return unknown.help(format!("digits are not grouped: write `{number}{digits}`"));
+        }
+        if let Some(meant) = nearest(word, foreign::UNITS_IN_FULL)
+            && let Some(written) = foreign::quantity(number, meant)
+        {
+            return unknown.help(format!("is `{meant}` meant? write `{written}`"));
         }
         unknown
             .help(format!("a word after a number is its unit; to multiply, write `{number}*{word}`"))
