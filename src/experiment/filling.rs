@@ -424,9 +424,13 @@ impl Experiment {
             // a lattice that is fitted to the room beside a wall takes nothing from the fluid
             return None;
         }
+        let (within, near) = match (&self.scene.container, self.scene.obstacles.is_empty()) {
+            (None, _) => ("in an obstacle", "too close to one"),
+            (Some(_), true) => ("outside of the container", "too close to its walls"),
+            (Some(_), false) => ("in an obstacle or outside of the container", "too close to their walls"),
+        };
         let mut message = format!(
-            "{lost} of the fluid's particles were carved off: {} in an obstacle, {} too close to one, {} \
-             outside the box; {} are left",
+            "{lost} of the fluid's particles were carved off: {} {within}, {} {near}, {} outside the box; {} are left",
             carved.inside, carved.too_close, carved.outside_box, carved.kept
         );
         if let Some(off) = off {

@@ -290,24 +290,36 @@ impl Experiment {
         if bounds.intersection(&grown) == *bounds {
             return None;
         }
-        let (mut all, mut outside, mut far) = (0.0, 0.0, 0.0);
+        let (mut all, mut far) = (0.0, 0.0);
         for at in samples(bounds).filter(|at| self.fluid.omega(*at) > 0.0) {
             all += 1.0;
-            outside += f64::from(u8::from(!domain.contains(at)));
             far += f64::from(u8::from(!grown.contains(at)));
         }
-        let part = outside / all;
         (far / all > PART_OUTSIDE).then(|| {
-            let message = format!(
-                "about {:.0} % of the fluid's shape lies outside the box, and is left out",
-                100.0 * part
-            );
+            // a box may be thinner than the samples of the shape are apart, so that it has samples of its own
+            let (whole, within) = (self.volume_in(bounds), self.volume_in(&bounds.intersection(&domain)));
+            let percent = (100.0 * (1.0 - within / whole)).clamp(1.0, 100.0).round();
+            let share = match percent < 100.0 || within == 0.0 {
+                true => format!("about {percent} %"),
+                false => "more than 99 %".to_string(),
+            };
+            let message = format!("{share} of the fluid's shape lies outside the box, and is left out");
             let at =
                 format!("it lies between {} and {}", to_thousandths(bounds.min), to_thousandths(bounds.max));
             Diagnostic::warning(Code::FLUID_OUTSIDE_BOX, self.scene.fluid.shape_span, message)
                 .at(at)
                 .label(self.scene.domain_span, format!("the box goes from {} to {}", domain.min, domain.max))
         })
+    }
+
+    /// The volume, m³, of the fluid's shape in a region, found by samples.
+    fn volume_in(&self, region: &Aabb) -> f64 {
+        let (mut held, mut all) = (0.0, 0.0);
+        for at in samples(region) {
+            all += 1.0;
+            held += f64::from(u8::from(self.fluid.omega(at) > 0.0));
+        }
+        region.volume() * held / all
     }
 
     /// The part of the box, m³, that no body takes at a time, s, found by samples.
