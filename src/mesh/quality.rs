@@ -9,6 +9,8 @@
 //!
 //! Invariant: the samples depend on the mesh, the field and the grid alone; sums are taken in their order.
 
+use std::sync::atomic::{AtomicUsize, Ordering};
+
 use glam::DVec3;
 use rayon::prelude::*;
 use rstar::{AABB, PointDistance, RTree, RTreeObject};
@@ -20,7 +22,7 @@ use super::{
     shells,
 };
 use crate::field::Field;
-use crate::mesh::Unwatched;
+use crate::mesh::{Unwatched, Watch};
 
 /// Distances of many samples in metres, or angles of many samples in degrees.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
@@ -117,10 +119,15 @@ impl<'a> Reference<'a> {
     ///
     /// # Errors
     /// Those of [`dual_contouring`] in the finer grid that gives points of the surface.
-    pub fn new(field: &dyn Field, distance: &'a dyn Field, grid: &Grid) -> Result<Self, MeshError> {
+    pub fn new(
+        field: &dyn Field,
+        distance: &'a dyn Field,
+        grid: &Grid,
+        watch: &dyn Watch,
+    ) -> Result<Self, MeshError> {
         let finer = Grid::filling(grid.bounds(), Resolution::Spacing(0.5 * grid.spacing().min_element()));
         let finer = dual_contouring(field, finer.as_ref().unwrap_or(grid), &Unwatched)?;
-        Ok(Self { distance, points: surface_points(&finer, distance, grid), extent: extent(&finer) })
+        Ok(Self { distance, points: surface_points(&finer, distance, grid, watch), extent: extent(&finer) })
     }
 
     /// The distance of the point of the surface that is farthest from a mesh, in metres: no more than
@@ -130,7 +137,7 @@ impl<'a> Reference<'a> {
     }
 
     /// Measures a mesh of the surface. For a mesh without triangles all distances are 0.
-    pub fn measure(&self, mesh: &Mesh) -> Quality {
+    pub fn measure(&self, mesh: &Mesh, watch: &dyn Watch) -> Quality {
         let mut quality = shapes(mesh);
         if mesh.triangles.is_empty() {
             return quality;
@@ -138,7 +145,7 @@ impl<'a> Reference<'a> {
         let own = extent(mesh);
         quality.volume_error = own.0 / self.extent.0 - 1.0;
         quality.area_error = own.1 / self.extent.1 - 1.0;
-        mesh_to_surface(mesh, self.distance, &mut quality);
+        mesh_to_surface(mesh, self.distance, &mut quality, watch);
         quality.from_surface = surface_to_mesh(mesh, &self.points);
         quality
     }
@@ -155,7 +162,7 @@ pub fn measure(
     distance: &dyn Field,
     grid: &Grid,
 ) -> Result<Quality, MeshError> {
-    Ok(Reference::new(field, distance, grid)?.measure(mesh))
+    Ok(Reference::new(field, distance, grid, &Unwatched)?.measure(mesh, &Unwatched))
 }
 
 /// The volume and the area of a mesh.
@@ -238,12 +245,14 @@ fn spread([a, b, c]: [DVec3; 3]) -> impl Iterator<Item = DVec3> {
     std::iter::once((a + b + c) / 3.0).chain(lattice)
 }
 
-fn mesh_to_surface(mesh: &Mesh, field: &dyn Field, quality: &mut Quality) {
+fn mesh_to_surface(mesh: &Mesh, field: &dyn Field, quality: &mut Quality, watch: &dyn Watch) {
+    let share = Share::of(mesh.triangles.len(), watch);
     let is_cap = |t: &[u32; 3]| t.iter().any(|v| mesh.caps.binary_search(v).is_ok());
     let parts: Vec<(Sums, Sums, usize)> = mesh
         .triangles
         .par_chunks(BATCH)
         .map(|triangles| {
+            let each_batch = triangles.len();
             let triangles: Vec<[DVec3; 3]> =
                 triangles.iter().filter(|t| !is_cap(t)).map(|&t| corners(mesh, t)).collect();
             let points: Vec<DVec3> = triangles.iter().flat_map(|&t| spread(t)).collect();
@@ -262,6 +271,7 @@ fn mesh_to_surface(mesh: &Mesh, field: &dyn Field, quality: &mut Quality) {
                     }
                 }
             }
+            share.add(each_batch);
             (distances, angles, flipped)
         })
         .collect();
@@ -308,7 +318,7 @@ fn feet(field: &dyn Field, points: &[DVec3]) -> Vec<Foot> {
 }
 
 /// Points all over the surface and on its creases and corners, about half a cell apart, from a mesh of it.
-fn surface_points(mesh: &Mesh, distance: &dyn Field, grid: &Grid) -> Vec<DVec3> {
+fn surface_points(mesh: &Mesh, distance: &dyn Field, grid: &Grid, watch: &dyn Watch) -> Vec<DVec3> {
     let mut points = Vec::with_capacity(2 * mesh.positions.len());
     let caps: std::collections::HashSet<u32> = mesh.caps.iter().copied().collect();
     points.extend((0_u32..).zip(&mesh.positions).filter(|(v, _)| !caps.contains(v)).map(|(_, p)| *p));
@@ -318,11 +328,37 @@ fn surface_points(mesh: &Mesh, distance: &dyn Field, grid: &Grid) -> Vec<DVec3> 
         .filter(|t| !t.iter().any(|v| caps.contains(v)))
         .map(|&t| corners(mesh, t).iter().sum::<DVec3>() / 3.0)
         .collect();
-    let parts: Vec<Vec<Foot>> = middles.par_chunks(BATCH).map(|part| feet(distance, part)).collect();
+    let share = Share::of(middles.len(), watch);
+    let parts: Vec<Vec<Foot>> = middles
+        .par_chunks(BATCH)
+        .map(|part| {
+            let found = feet(distance, part);
+            share.add(part.len());
+            found
+        })
+        .collect();
     points.extend(parts.iter().flatten().map(|foot| foot.position));
     // a point that Newton's method lost says nothing
     points.retain(|p| p.is_finite() && grid.bounds().contains(*p));
     points
+}
+
+/// How much of some work is done, for those who wait for it.
+struct Share<'a> {
+    all: usize,
+    done: AtomicUsize,
+    watch: &'a dyn Watch,
+}
+
+impl<'a> Share<'a> {
+    fn of(all: usize, watch: &'a dyn Watch) -> Self {
+        Self { all, done: AtomicUsize::new(0), watch }
+    }
+
+    fn add(&self, more: usize) {
+        let done = self.done.fetch_add(more, Ordering::Relaxed) + more;
+        self.watch.progress(done as f64 / self.all.max(1) as f64);
+    }
 }
 
 /// A triangle in the spatial index.

@@ -271,17 +271,18 @@ fn measured(
     options: &Options,
 ) -> Result<(Option<Quality>, Option<Simplified>), Failure> {
     let depth = Depth(solid);
-    let spinner = progress::spinner("a finer mesh");
-    let reference = Reference::new(surface, &depth, grid);
-    spinner.finish_and_clear();
+    let bar = progress::bar(1000, "a finer mesh");
+    let reference =
+        Reference::new(surface, &depth, grid, &|part: f64| bar.set_position((1000.0 * part) as u64));
+    bar.finish_and_clear();
     let reference = reference.map_err(Failure::usage)?;
     let found =
         options.simplify.map(|tolerance| simplified(mesh, tolerance, &depth, &reference, options.method));
     let quality = options.quality.then(|| {
         found.as_ref().and_then(|found| found.quality).unwrap_or_else(|| {
-            let spinner = progress::spinner("measuring");
-            let quality = reference.measure(mesh);
-            spinner.finish_and_clear();
+            let bar = progress::bar(1000, "measuring");
+            let quality = reference.measure(mesh, &|part: f64| bar.set_position((1000.0 * part) as u64));
+            bar.finish_and_clear();
             quality
         })
     });

@@ -88,8 +88,8 @@ pub(super) fn simplified(
     }
     let (mut simplifying, mut measuring) = (0.0, milliseconds(started));
     let measure = |mesh: &Mesh, time: &mut f64| {
-        let (started, bar) = (Instant::now(), progress::spinner("measuring"));
-        let quality = reference.measure(mesh);
+        let (started, bar) = (Instant::now(), progress::bar(1000, "measuring"));
+        let quality = reference.measure(mesh, &|part: f64| bar.set_position((1000.0 * part) as u64));
         bar.finish_and_clear();
         *time += milliseconds(started);
         quality

@@ -155,7 +155,7 @@ fn measure(scene: &Scene, cells: usize) {
     let depth = Depth(&solid);
     let reference = scene
         .measured_in
-        .map(|cells| Reference::new(&*surface, &depth, &grid(cells)).unwrap_or_else(|e| panic!("{e}")));
+        .map(|cells| Reference::new(&*surface, &depth, &grid(cells), &Unwatched).unwrap_or_else(|e| panic!("{e}")));
     print(scene, cells, &rows, reference.as_ref());
 }
 
@@ -174,7 +174,7 @@ fn print(scene: &Scene, cells: usize, rows: &[Row<'_>], reference: Option<&Refer
     println!("| | ms | / ours | triangles | Hausdorff | rms to surface | volume error | closed manifold |");
     println!("|---|--:|--:|--:|--:|--:|--:|---|");
     for row in rows {
-        let quality: Option<Quality> = reference.map(|reference| reference.measure(&row.found));
+        let quality: Option<Quality> = reference.map(|reference| reference.measure(&row.found, &Unwatched));
         let volume: f64 = shells(&row.found).iter().map(|shell| shell.volume).sum();
         let error = scene.volume.map(|truth| format!("{:+.3} %", 100.0 * (volume / truth - 1.0)));
         let metres = |of: fn(&Quality) -> f64| quality.as_ref().map(|quality| format!("{:.1e}", of(quality)));
