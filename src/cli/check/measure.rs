@@ -76,8 +76,8 @@ pub(super) fn measure(
     match mesh::volume(&*surface, bounds, VOLUME_CELLS, deadline) {
         Ok(found) => take(&found, VOLUME_CELLS, &mut facts),
         Err(VolumeError::TooThin) => {
-            facts.no_volume =
-                Some(format!("it is empty, or too thin for {VOLUME_CELLS} cells along its longest side"));
+            let why = format!("it is empty, or too thin for {VOLUME_CELLS} cells along its longest side");
+            facts.no_volume = Some(why + &uneven_sides(bounds).unwrap_or_default());
             shows_nothing = true;
         }
         Err(error @ VolumeError::TooFewCells(_)) => return Err(Failure::usage(error)),
@@ -107,6 +107,20 @@ pub(super) fn measure(
     // a part too thin for a cell would have been found
     facts.shows_nothing = shows_nothing && thin.is_some_and(|thin| thin.count == 0 && !thin.ended);
     Ok((facts, thin.unwrap_or(ThinCells::NONE)))
+}
+
+/// What there is to ask of bounds with a side that is far longer than another, as in `box([0, 0, 0], [10 mm, 20 mm, 5])`.
+fn uneven_sides(bounds: &Aabb) -> Option<String> {
+    let sides = bounds.size();
+    let ratio = sides.max_element() / sides.min_element();
+    let axis = |side: f64| ["x", "y", "z"].into_iter().zip(sides.to_array()).find(|(_, own)| *own == side);
+    let (long, _) = axis(sides.max_element())?;
+    let (short, _) = axis(sides.min_element())?;
+    (ratio.is_finite() && ratio > VOLUME_CELLS as f64).then(|| {
+        format!(
+            "; along {long} it is {ratio:.0} times as long as along {short}: is a unit such as mm missing?"
+        )
+    })
 }
 
 /// The figures of meshes, the finest of which has so many cells along the longest side.
