@@ -210,6 +210,11 @@ impl Parameters {
         self.method.numerics().sound_speed(&self.scales())
     }
 
+    /// Whether the scene states the speed of sound. Otherwise it follows from how fast the fluid may become.
+    pub fn states_sound_speed(&self) -> bool {
+        self.stated_sound().is_some()
+    }
+
     /// The longest step, s, that is stable while no particle is faster than `max_speed`, m/s: the least of
     /// the limits of sound and motion, of viscosity, of ripples under surface tension, and of gravity. The
     /// method has their formulas.

@@ -7,6 +7,7 @@ use std::path::Path;
 use serde::Serialize;
 
 use super::super::args::Run;
+use super::super::explain::sound_speed;
 use super::super::failure::warn;
 use super::super::output::counted;
 use super::super::progress::duration;
@@ -18,7 +19,7 @@ use super::goal::{Begin, Goal};
 use super::summary::pass_names;
 use super::{folder, refused, start};
 use rfm::diagnostic::Code;
-use rfm::sph::{Checkpoint, Simulation};
+use rfm::sph::{Checkpoint, Parameters, Simulation};
 use rfm::{Error, Experiment};
 
 /// Most particles of a simulation that is started to be measured, and least if they have very many neighbours.
@@ -44,6 +45,10 @@ struct Forecast {
     neighbours_per_particle: f64,
     time_step: f64,
     time_step_reason: &'static str,
+    /// The speed of sound, m/s; null if the method has none.
+    sound_speed: Option<f64>,
+    /// Whether the scene states it.
+    sound_speed_stated: bool,
     steps: u64,
     passes: Vec<&'static str>,
     bytes: f64,
@@ -94,6 +99,8 @@ pub(super) fn dry_run(
         neighbours_per_particle: stats.neighbours_per_particle,
         time_step,
         time_step_reason: experiment.time_step().reason,
+        sound_speed: Some(parameters.sound_speed()).filter(|speed| *speed > 0.0),
+        sound_speed_stated: parameters.states_sound_speed(),
         steps,
         passes: pass_names(simulation),
         bytes: memory(simulation, scale),
@@ -110,7 +117,7 @@ pub(super) fn dry_run(
     if shared.json {
         return output::json(&forecast);
     }
-    print(&forecast);
+    print(&forecast, parameters);
     Ok(())
 }
 
@@ -225,13 +232,16 @@ fn warn_of_too_much(forecast: &Forecast) {
     }
 }
 
-fn print(forecast: &Forecast) {
+fn print(forecast: &Forecast, parameters: &Parameters) {
     let about = if forecast.estimated { "about " } else { "" };
     let free = |free: Option<f64>| free.map_or(String::new(), |free| format!(", {} free", size(free)));
     say!("particles     {about}{}", forecast.particles);
     say!("spacing       {:.3e} m", forecast.spacing);
     say!("neighbours    {:.1} per particle", forecast.neighbours_per_particle);
     say!("time step     {:.3e} s ({})", forecast.time_step, forecast.time_step_reason);
+    if forecast.sound_speed.is_some() {
+        say!("sound speed   {}", sound_speed(parameters));
+    }
     say!("steps         {}", forecast.steps);
     say!("passes        {}", forecast.passes.join(", "));
     say!("memory        about {}{}", size(forecast.bytes), free(forecast.bytes_free));

@@ -23,6 +23,10 @@ pub(super) struct Summary {
     steps: u64,
     simulated_seconds: f64,
     time_step: f64,
+    /// The speed of sound, m/s; null if the method has none.
+    sound_speed: Option<f64>,
+    /// Whether the scene states it; otherwise it is derived.
+    sound_speed_stated: bool,
     particles: usize,
     particles_carved: usize,
     /// Mass of one particle, kg.
@@ -104,6 +108,8 @@ impl Summary {
             steps,
             simulated_seconds: simulation.time(),
             time_step: simulation.time() / steps.max(1) as f64,
+            sound_speed: Some(simulation.parameters().sound_speed()).filter(|speed| *speed > 0.0),
+            sound_speed_stated: simulation.parameters().states_sound_speed(),
             particles: watch.now.particles,
             particles_carved: watch.carved,
             particle_mass: simulation.parameters().particle_mass,
