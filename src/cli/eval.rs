@@ -46,7 +46,7 @@ pub(super) fn run(shared: &Shared, options: &Eval) -> Result<(), Failure> {
         None => choose::within_tolerance(&program, &solid)?,
         Some(_) => None, // the user chose the precision
     };
-    let mut writer = Table::new(solid, chosen, options, shared.json)?;
+    let mut writer = Table::new(solid, chosen, options, shared.json);
     writer.rows(&options.at)?;
     if let Some(path) = &options.points {
         let name = if path == stdin { "<stdin>".to_string() } else { path.shown().to_string() };
@@ -120,6 +120,8 @@ struct Table {
     rows: Rows,
     /// The rows for JSON, which are collected because they are one document.
     json: Option<Vec<serde_json::Value>>,
+    /// Whether the head of the table is written: not before there are points.
+    has_head: bool,
     out: BufWriter<io::Stdout>,
 }
 
@@ -148,20 +150,25 @@ struct Columns {
 }
 
 impl Table {
-    fn new(solid: Solid, chosen: Option<Chosen>, options: &Eval, json: bool) -> Result<Self, Failure> {
+    fn new(solid: Solid, chosen: Option<Chosen>, options: &Eval, json: bool) -> Self {
         let rows = Rows::new(solid, chosen, options);
-        let mut out = BufWriter::new(io::stdout());
-        if !json {
-            writeln!(out, "{}", rows.names.join(","))?;
+        let out = BufWriter::new(io::stdout());
+        Self { rows, json: json.then(Vec::new), has_head: json, out }
+    }
+
+    fn head(&mut self) -> io::Result<()> {
+        if std::mem::replace(&mut self.has_head, true) {
+            return Ok(());
         }
-        Ok(Self { rows, json: json.then(Vec::new), out })
+        writeln!(self.out, "{}", self.rows.names.join(","))
     }
 
     fn rows(&mut self, points: &[DVec3]) -> Result<(), Failure> {
         if points.is_empty() {
             return Ok(());
         }
-        let Self { rows, json, out } = self;
+        self.head()?;
+        let Self { rows, json, out, has_head: _ } = self;
         if points.len() >= MANY_POINTS && rows.needs_only_signs() {
             rows.cells(); // not in a thread of the pool: others would wait for it
         }
@@ -184,6 +191,7 @@ impl Table {
     }
 
     fn finish(mut self) -> Result<(), Failure> {
+        self.head()?;
         self.out.flush()?;
         match self.json {
             Some(points) => output::json(&Document { schema: 1, points }),
@@ -501,7 +509,7 @@ mod tests {
             what,
             precision: None,
         };
-        Table::new(program.solid("s").unwrap(), None, &options, true).unwrap()
+        Table::new(program.solid("s").unwrap(), None, &options, true)
     }
 
     #[test]

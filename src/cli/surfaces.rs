@@ -111,10 +111,26 @@ impl<'a> Surfaces<'a> {
     }
 }
 
+/// The ending of surfaces that were written for other programs alone, as by `--format ply`.
+fn other_format(folder: &Path) -> Option<String> {
+    let endings = std::fs::read_dir(folder)
+        .ok()?
+        .flatten()
+        .filter_map(|entry| entry.path().extension().map(|ending| ending.to_string_lossy().to_string()));
+    endings.filter(|ending| ["ply", "stl", "obj"].contains(&ending.as_str())).min()
+}
+
 /// The surfaces of these frames of a run.
 pub(super) fn of_frames(run: &Path, entries: &[(usize, FrameEntry)]) -> Result<Vec<PathBuf>, Failure> {
     let made_by = format!("`rfm mesh {} --fluid` makes them", run.shown());
     let Some(surfaces) = Surfaces::of(run)? else {
+        if let Some(ending) = other_format(&run.join(FOLDER)) {
+            return Err(Failure::usage(format!(
+                "--surface: the surfaces in `{}` are .{ending} files, and pictures need the .vtp: {made_by}, without \
+                 --format",
+                run.join(FOLDER).shown()
+            )));
+        }
         return Err(Failure::usage(format!(
             "--surface: there are no surfaces of the fluid in `{}`: {made_by}",
             run.join(FOLDER).shown()

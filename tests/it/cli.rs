@@ -511,6 +511,7 @@ fn run_defaults_and_flags() {
         "{}",
         dry.stdout
     );
+    assert!(dry.stdout.contains("sound speed   ") && dry.stdout.contains("(derived: "), "{}", dry.stdout);
     assert_eq!(files(folder.path()), ["drop.rfm"]);
     rfm(folder.path(), &["run", "drop.rfm", "--steps", "2", "--no-pictures"]).expect(0);
     assert_eq!(files(folder.path()), ["drop.out", "drop.rfm"]);
@@ -518,6 +519,7 @@ fn run_defaults_and_flags() {
     let none = rfm(folder.path(), &["run", "drop.rfm", "--steps", "0", "--no-frames", "--json", "-o", "z"])
         .expect(0);
     assert_eq!(none.json()["steps"], 0);
+    assert!(none.json()["sound_speed"].as_f64() > Some(0.0) && none.json()["sound_speed_stated"] == false);
     assert_eq!(files(&folder.path().join("z")), ["history", "summary.json"]);
     // the start alone: a header and a line for each table
     for table in ["energy", "audit"] {
@@ -535,6 +537,9 @@ fn one_document_or_none() {
     run(&["explain", "E0201", "--json"]).expect(2);
     run(&["check", "-", "-s", "pots"]).expect(2);
     run(&["check", "-", "--threads", "1025"]).expect(2);
+    let mixed =
+        rfm_reading(root(), &["check", "-"], b"rfm 1\nsolid s = box([0, 0, 0], [10 mm, 20 mm, 5])").expect(0);
+    assert!(mixed.stdout.contains("along z it is 500 times as long as along x"), "{}", mixed.stdout);
     let thin = b"rfm 1\nsolid s = sphere(1) and -1e-4 <= x + y + 0.7*z - 0.0123 <= 1e-4";
     let thin = rfm_reading(root(), &["check", "-", "--json"], thin).expect(0).json();
     assert_eq!((&thin["solids"][0]["empty"], &thin["solids"][0]["volume"]), (&false.into(), &().into()));

@@ -98,6 +98,9 @@ fn surfaces_that_are_not_there_are_asked_for() {
     assert!(refused(&["--particles"]).contains("--surface"));
     assert!(refused(&["--surface=foam"]).contains("[possible values: clear, opaque]"));
     assert!(refused(&["--glass", "vase"]).contains("--glass vase: the run has no such obstacle"));
+    rfm(here, &["mesh", "out", "--fluid", "--frames", "0..1", "--format", "ply"]).expect(0);
+    let told = refused(&["--surface"]);
+    assert!(told.contains("are .ply files, and pictures need the .vtp"), "{told}");
     rfm(here, &["mesh", "out", "--fluid", "--frames", "0..1"]).expect(0);
     let told = refused(&["--surface"]);
     assert!(told.contains("frame 1, at") && told.contains("has no surface"), "{told}");
