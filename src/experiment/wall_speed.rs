@@ -42,7 +42,8 @@ const HALVINGS: usize = 12;
 /// its normal, or the whole if the fluid sticks to it; `belt` is its motion within the surface where that is
 /// stated. A surface with the acceleration a raises pressures up to ρ·a·L over a length L, that of the box or
 /// of some bodies, as a speed of √(a·L) does: otherwise a body that swings fast over a short way would drive
-/// a fluid whose sound is so slow that it resounds. Zero for a solid at rest.
+/// a fluid whose sound is so slow that it resounds. A wall that drags the fluid along does the same in a closed
+/// vessel, where the fluid returns elsewhere. Zero for a solid at rest.
 ///
 /// The speed is found at some places and times, so a wall that moves only during a hundredth of the run may
 /// be missed. Solids of many parts are not looked at: their gradients would be one large program, which
@@ -65,16 +66,18 @@ pub(super) fn greatest(
     let mut greatest = 0.0;
     at_places(solid, domain, until, |(time, [now, later]), (p, normal)| {
         let velocity = now.wall_velocity(p);
-        let along = match (slip, &belt) {
-            (Slip::Free, _) => 0.0,
-            // the surface of a solid at rest, which knows no time, may still move
-            (Slip::No, Some(belt)) => belt(p, time).length(),
-            (Slip::No, None) => velocity.length(),
+        let velocity_later = later.wall_velocity(p);
+        // what drives the fluid along the wall; the surface of a solid at rest, which knows no time, may still move
+        let [along, along_later] = match (slip, &belt) {
+            (Slip::Free, _) => [DVec3::ZERO; 2],
+            (Slip::No, Some(belt)) => [0.0, SOON * until].map(|after| belt(p, time + after)),
+            (Slip::No, None) => [velocity, velocity_later],
         };
         let across = velocity.dot(normal);
-        let change = later.wall_velocity(p).dot(normal) - across;
-        let by_pressure = (change.abs() / (SOON * until) * reach).sqrt();
-        let speeds = [across.abs(), along, by_pressure];
+        let change = velocity_later.dot(normal) - across;
+        let change = change.abs().max((along_later - along).length());
+        let by_pressure = (change / (SOON * until) * reach).sqrt();
+        let speeds = [across.abs(), along.length(), by_pressure];
         greatest = speeds.into_iter().filter(|speed| speed.is_finite()).fold(greatest, f64::max);
     });
     greatest

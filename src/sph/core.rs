@@ -206,6 +206,11 @@ impl Core {
         std::mem::replace(&mut self.wall, wall)
     }
 
+    /// For each axis the part of the kernel's moment at a particle that lies behind the walls of the box across it.
+    pub fn box_moments(&self, i: usize) -> DVec3 {
+        self.boundary.box_moments(&self.wall, self.particles.position.get(i))
+    }
+
     /// Gravity at a particle, m/s², at the end of the present step.
     pub fn gravity(&self, i: usize) -> DVec3 {
         let field = self

@@ -340,6 +340,19 @@ impl Boundary {
         Some(whole.with_friction(friction))
     }
 
+    /// For each axis the K along it of the walls of the box that lie across it, see [`Coverage::tensor`].
+    pub fn box_moments(&self, wall: &Wall, p: DVec3) -> DVec3 {
+        let across = |axis: usize, distance: f64| {
+            let normal = DVec3::AXES[axis];
+            let face = Coverage::<()>::of_face(wall, &Face { distance, normal, mean_curvature: 0.0 });
+            normal.dot(face.tensor().to_matrix() * normal)
+        };
+        let both = |axis: usize| {
+            across(axis, p[axis] - self.domain.min[axis]) + across(axis, self.domain.max[axis] - p[axis])
+        };
+        DVec3::from_array([0, 1, 2].map(both))
+    }
+
     /// What the walls of the box take of the kernel of a particle.
     pub(super) fn of_box<F: Friction, B: Behind>(&self, wall: &Wall, p: DVec3) -> Coverage<F, B> {
         let mut whole = Coverage::<F, B>::default();

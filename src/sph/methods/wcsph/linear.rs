@@ -18,11 +18,26 @@ pub(super) struct Linear {
     pub parting: Symmetric,
 }
 
+/// What the walls of the box ask of a gradient of pressure: across a wall that rests the fluid is not accelerated.
+///
+/// (Without that, gradients at a wall are those from the neighbours on one side, while the compression there knows the
+/// wall. Waves across a gap of four spacings then grow by a third in the time of sound for two support radii, faster
+/// than an artificial viscosity of 0.1 damps them.)
+#[derive(Clone, Copy, Default)]
+pub(super) struct Held {
+    /// For each axis the part of a kernel's moment across the walls that lies behind them.
+    pub weight: DVec3,
+    /// The force per volume, N/m³, by which pressures balance all else.
+    pub push: DVec3,
+}
+
 impl Linear {
-    /// The gradient whose sum over the neighbours alone is `sum`. Half of the neighbours suffice, so nothing is
-    /// assumed behind a wall.
-    pub fn gradient(&self, steepness: f64, sum: DVec3) -> DVec3 {
-        inverse_above(&(steepness * self.moment).to_matrix(), LEAST_MOMENT) * sum
+    /// The gradient whose sum over the neighbours alone is `sum`, with what walls of the box ask of it. Half of the
+    /// neighbours suffice where nothing is known of a wall.
+    pub fn gradient(&self, steepness: f64, sum: DVec3, held: &Held) -> DVec3 {
+        let of_walls = Symmetric::new(held.weight, DVec3::ZERO);
+        let whole = (steepness * self.moment + of_walls).to_matrix();
+        inverse_above(&whole, LEAST_MOMENT) * (sum + held.weight * held.push)
     }
 
     /// The rate −∇·v at which the fluid is compressed, 1/s. A wall fills a part of the kernel as neighbours do,

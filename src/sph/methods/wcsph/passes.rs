@@ -11,7 +11,7 @@ use super::super::{
     shifting::{depth, falling_rate, return_rate},
 };
 use super::Gradients;
-use super::linear::Linear;
+use super::linear::{Held, Linear};
 use super::numbers::{Numbers, at_rest};
 use crate::sph::{
     core::Core,
@@ -274,7 +274,11 @@ impl<const LAMINAR: bool, const ARTIFICIAL: bool, const EVEN: bool> Pairs<'_, LA
         push *= mean;
         let mut compression = mean * (compression_by_pairs + wall_rate);
         if let Some(linear) = linear.filter(|_| smooth > 0.0) {
-            push = push.lerp(linear.gradient(steepness, blended), smooth);
+            let held = wall.as_ref().map_or_else(Held::default, |_| Held {
+                weight: rates.core.box_moments(i),
+                push: -density * rates.core.gravity(i),
+            });
+            push = push.lerp(linear.gradient(steepness, blended, &held), smooth);
             // before a surface too few neighbours lie on one side, and what is exact is noisy
             if rates.numbers.fills_room {
                 let exact = linear.compression(steepness, wall.as_ref(), wall_rate);

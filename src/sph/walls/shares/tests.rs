@@ -17,7 +17,12 @@ fn sticky(field: impl Walls + 'static) -> Obstacle {
 fn boundary(gap: f64) -> Boundary {
     let left = Closures { omega: |p: DVec3| -p.x, gradient: |_: DVec3| -DVec3::X };
     let right = Closures { omega: move |p: DVec3| p.x - gap, gradient: |_: DVec3| DVec3::X };
-    let obstacles: Vec<Obstacle> = vec![sticky(left), sticky(right)];
+    around(vec![sticky(left), sticky(right)])
+}
+
+/// That box with other obstacles.
+fn around(obstacles: Vec<Obstacle>) -> Boundary {
+    let broad_phase = BroadPhase::unknown(obstacles.len());
     Boundary {
         domain: Aabb::new(DVec3::new(-5.0, -5.0, 0.0), DVec3::splat(5.0)),
         wall_restitution: 0.0,
@@ -29,7 +34,7 @@ fn boundary(gap: f64) -> Boundary {
         step: 0.0,
         clearance: 1e-6,
         maps: Maps::new(&[], &Aabb::new(DVec3::ZERO, DVec3::ONE), 1.0, 0.0),
-        broad_phase: BroadPhase::unknown(2),
+        broad_phase,
     }
 }
 
@@ -69,7 +74,7 @@ fn a_thin_plate_presses_as_what_it_takes() {
     let text = "rfm 1\nsolid plate = box([-0.1, -9, -9], [0, 9, 9])";
     let program = crate::Program::from_source("plate.rfm", text).unwrap();
     let plate = sticky(program.solid("plate").unwrap());
-    let boundary = Boundary { obstacles: vec![plate], ..boundary(9.0) };
+    let boundary = around(vec![plate]);
     let wall = Wall::new(WallKernel::WendlandC2, 1.0, 0.5);
     let p = DVec3::new(0.2, 0.0, 0.3);
     let slope = |distance: f64| wall.kernel.slope(distance);
@@ -95,7 +100,7 @@ fn what_is_behind_another_wall_has_nothing() {
         by_friction: DVec3::new(1.0, 2.0, 0.0),
         ..Pushed::default()
     };
-    let twice = Boundary { obstacles: vec![sticky(slab()), sticky(slab())], ..boundary(9.0) };
+    let twice = around(vec![sticky(slab()), sticky(slab())]);
     let [first, second] = shares(&twice, p, pushed);
     let whole = pushed.by_pressure + pushed.by_friction;
     assert!((first - whole).length() < 1e-9 && second.length() < 1e-9, "{first} {second}");
@@ -108,12 +113,12 @@ fn what_is_behind_another_wall_has_nothing() {
         "rfm 1\nsolid lower = box([-9, -9, 0], [9, 9, 0.1])\nsolid upper = box([-9, -9, 0.1], [9, 9, 0.2])";
     let program = crate::Program::from_source("slabs.rfm", text).unwrap();
     let slabs = ["lower", "upper"].map(|name| sticky(program.solid(name).unwrap()));
-    let mut stack = Boundary { obstacles: slabs.into(), ..boundary(9.0) };
+    let mut stack = around(slabs.into());
     stack.obstacles[1].slip = Slip::Free;
     let [lower, upper] = shares(&stack, p + 0.1 * DVec3::Z, pushed);
     assert!((upper - whole).length() < 0.02 && lower.length() < 0.02, "{lower} {upper}");
     // below a gap the floor has its part
-    let above = Boundary { obstacles: vec![sticky(plate(0.1, 0.2))], ..boundary(9.0) };
+    let above = around(vec![sticky(plate(0.1, 0.2))]);
     let mut shares = DVec3::ZERO;
     let wall = Wall::new(WallKernel::WendlandC2, 1.0, 0.5);
     above.divide(&wall, p, &pushed, |_, share| shares += share.by_pressure + share.by_friction);
