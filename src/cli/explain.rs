@@ -6,7 +6,7 @@ use glam::DVec3;
 
 use super::args::{Explain, Stage};
 use super::language::{page, words::is_of_a_word};
-use super::output::significant;
+use super::output::sound_speed;
 use super::run::{experiment, start};
 use super::shared::Shared;
 use super::{Failure, choose, input};
@@ -18,7 +18,7 @@ use rfm::ir::{Node, dump};
 use rfm::lower::{NamedSolid, Scene};
 use rfm::simplify::{Exactness, MOST_PLACES, simplify};
 use rfm::solid::{Bounds, ProgramKind, Remainder};
-use rfm::sph::{Method, Parameters, method_reference, methods_reference};
+use rfm::sph::{Method, method_reference, methods_reference};
 use rfm::syntax;
 use rfm::{Precision, Program, Solid};
 
@@ -395,13 +395,4 @@ fn scene_passes(shared: &Shared, program: &Program, scene: &Scene) -> Result<(),
         }
     }
     Ok(())
-}
-
-/// The speed of sound of a scene, and whether it is stated.
-pub(super) fn sound_speed(parameters: &Parameters) -> String {
-    let origin = match parameters.states_sound_speed() {
-        true => "stated",
-        false => "derived: ten times the greatest speed that is foreseen",
-    };
-    format!("{} m/s ({origin})", significant(parameters.sound_speed(), 3))
 }

@@ -11,6 +11,7 @@ use std::sync::Mutex;
 use serde::Serialize;
 
 use rfm::diagnostic::{is_hidden, printable, printable_line};
+use rfm::sph::Parameters;
 
 use super::failure::{Failure, complain};
 
@@ -248,6 +249,15 @@ pub(super) fn significant(figure: f64, digits: usize) -> String {
     } else {
         format!("{figure:.*e}", digits - 1)
     }
+}
+
+/// The speed of sound of a scene, and whether it is stated.
+pub(super) fn sound_speed(parameters: &Parameters) -> String {
+    let origin = match parameters.states_sound_speed() {
+        true => "stated",
+        false => "derived: ten times the greatest speed that is foreseen",
+    };
+    format!("{} m/s ({origin})", significant(parameters.sound_speed(), 3))
 }
 
 /// A number of things: `1 frame`, `3 frames`.

@@ -2,7 +2,8 @@
 
 use std::sync::Arc;
 
-use super::{rigid_parts, vector_field, wall_speed};
+use super::wall_speed::{self, Driven};
+use super::{rigid_parts, vector_field};
 use crate::compile::Error;
 use crate::field::{Moving, Walls};
 use crate::ir::Node;
@@ -54,13 +55,13 @@ pub(super) fn compile(program: &Program, scene: &Scene, engine: Engine) -> Resul
     container.chain(obstacles).map(part).collect()
 }
 
-/// The greatest speed, m/s, of walls and surfaces that move.
-pub(super) fn greatest_speed(program: &Program, scene: &Scene, parts: &[Part]) -> f64 {
+/// The greatest speeds of walls and surfaces that move.
+pub(super) fn greatest_speed(program: &Program, scene: &Scene, parts: &[Part]) -> Driven {
     let speed = |part: &Part| {
         let belt = part.skin.velocity.map(|nodes| vector_field(program, &nodes));
         wall_speed::greatest(&part.whole, (part.skin.slip, belt), &scene.domain, scene.run.until)
     };
-    parts.iter().map(speed).fold(0.0, f64::max)
+    parts.iter().map(speed).fold(Driven::default(), Driven::or)
 }
 
 /// The parts in the form that a simulation needs.

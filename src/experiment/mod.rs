@@ -59,6 +59,8 @@ pub struct Experiment {
     program: Program,
     scene: Scene,
     parameters: Parameters,
+    /// A speed that the fluid may reach, m/s, without that of pressures alone.
+    seen_speed: f64,
     time_step: TimeStep,
     bodies: Vec<Body>,
     fluid: Solid,
@@ -101,7 +103,8 @@ impl Experiment {
         let fluid = program.compile(&scene.fluid.name, scene.fluid.shape, engine)?;
         let parts = bodies::compile(&program, &scene, engine)?;
         let by_walls = bodies::greatest_speed(&program, &scene, &parts);
-        let typical_speed = parameters::typical_speed(&program, &scene).max(by_walls);
+        let seen_speed = parameters::typical_speed(&program, &scene).max(by_walls.by_motion);
+        let typical_speed = seen_speed.max(by_walls.by_pressure);
         let mass = filling::mass_by_number(&scene, &fluid).unwrap_or(scene.fluid.mass);
         let mut parameters = parameters::of_scene(&program, &scene, mass, typical_speed);
         let mut method = scene.method;
@@ -129,7 +132,7 @@ impl Experiment {
         let warnings = warnings.chain(parameters::many_steps(&scene, &parameters));
         let warnings = warnings.chain(drag::warnings(&scene, &parameters, &bodies));
         let warnings = warnings.chain(probes::in_bodies(&scene, &bodies, parameters.spacing())).collect();
-        Ok(Self { program, scene, parameters, time_step, bodies, fluid, warnings })
+        Ok(Self { program, scene, parameters, seen_speed, time_step, bodies, fluid, warnings })
     }
 
     /// The program that the scene belongs to.
@@ -168,10 +171,10 @@ impl Experiment {
         &self.bodies
     }
 
-    /// A speed that the fluid may reach, m/s, for the scale of pictures: [`Experiment::typical_speed`], or if
-    /// that is 0, the speed that other causes give the fluid. Always positive.
+    /// A speed that the fluid may reach, m/s, for the scale of pictures: that of its start, of a fall through the box
+    /// and of walls, or if they are 0, the speed that other causes give the fluid. Always positive.
     pub fn speed_scale(&self) -> f64 {
-        match self.typical_speed() {
+        match self.seen_speed {
             speed if speed > 0.0 => speed,
             _ => parameters::driven_speed(&self.program, &self.scene),
         }

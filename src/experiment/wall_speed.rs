@@ -38,7 +38,26 @@ const REACH: f64 = 4.0;
 /// How often a stretch of time is halved in search of a motion that is short.
 const HALVINGS: usize = 12;
 
-/// The greatest speed, m/s, with which a solid's surface drives the fluid in a box during a run: that along
+/// The greatest speeds, m/s, to which walls drive a fluid.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct Driven {
+    /// The speed of the walls themselves.
+    pub by_motion: f64,
+    /// The speed that belongs to the pressures of their acceleration. The fluid need not reach it.
+    pub by_pressure: f64,
+}
+
+impl Driven {
+    /// The greater of each.
+    pub fn or(self, other: Self) -> Self {
+        Self {
+            by_motion: self.by_motion.max(other.by_motion),
+            by_pressure: self.by_pressure.max(other.by_pressure),
+        }
+    }
+}
+
+/// The greatest speeds, m/s, with which a solid's surface drives the fluid in a box during a run: that along
 /// its normal, or the whole if the fluid sticks to it; `belt` is its motion within the surface where that is
 /// stated. A surface with the acceleration a raises pressures up to ρ·a·L over a length L, that of the box or
 /// of some bodies, as a speed of √(a·L) does: otherwise a body that swings fast over a short way would drive
@@ -53,17 +72,17 @@ pub(super) fn greatest(
     (slip, belt): (Slip, Option<Arc<VectorField>>),
     domain: &Aabb,
     until: f64,
-) -> f64 {
+) -> Driven {
     let belt = belt.filter(|_| slip == Slip::No);
+    let mut driven = Driven::default();
     if !(solid.moves() || belt.is_some()) || solid.has_many_leaves() {
-        return 0.0;
+        return driven;
     }
     let size = match solid.at(0.0).bounds() {
         Bounds::Within(bounds) => REACH * bounds.size().max_element(),
         Bounds::Empty | Bounds::Unbounded => f64::INFINITY,
     };
     let reach = size.min(domain.size().max_element());
-    let mut greatest = 0.0;
     at_places(solid, domain, until, |(time, [now, later]), (p, normal)| {
         let velocity = now.wall_velocity(p);
         let velocity_later = later.wall_velocity(p);
@@ -77,10 +96,14 @@ pub(super) fn greatest(
         let change = velocity_later.dot(normal) - across;
         let change = change.abs().max((along_later - along).length());
         let by_pressure = (change / (SOON * until) * reach).sqrt();
-        let speeds = [across.abs(), along.length(), by_pressure];
-        greatest = speeds.into_iter().filter(|speed| speed.is_finite()).fold(greatest, f64::max);
+        let finite = |speed: f64| if speed.is_finite() { speed } else { 0.0 };
+        let seen = Driven {
+            by_motion: finite(across.abs()).max(finite(along.length())),
+            by_pressure: finite(by_pressure),
+        };
+        driven = driven.or(seen);
     });
-    greatest
+    driven
 }
 
 /// A time, s, in which a solid's surface in a box moves by at most `way`, m, along its normal, and in which

@@ -7,9 +7,8 @@ use std::path::Path;
 use serde::Serialize;
 
 use super::super::args::Run;
-use super::super::explain::sound_speed;
 use super::super::failure::warn;
-use super::super::output::counted;
+use super::super::output::{counted, sound_speed};
 use super::super::progress::duration;
 use super::super::shared::Shared;
 use super::super::stopwatch::Stopwatch;

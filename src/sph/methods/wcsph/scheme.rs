@@ -51,7 +51,8 @@
 //! continued linearly by the fluid's own balance ∇p = ρ(g + viscous − a). Since a is the unknown, this is a
 //! linear system of three unknowns for each particle at a wall; the factor (1 − K)⁻¹ solves it. (Without it
 //! water at rest keeps moving along its walls, 3 cm/s in the mean after three seconds instead of 1 cm/s, and
-//! is 14 % too light at the floor.) Spray that hits a wall has no balance, so it has no such factor, and its
+//! is 14 % too light at the floor.) With gradients by differences the box's own walls need no such factor: across
+//! them a is zero, which is one more condition on the gradient ([`Held`](super::linear::Held)). Spray that hits a wall has no balance, so it has no such factor, and its
 //! motion conserves energy. Particles of a surface at rest have the factor, or walls would not bear their
 //! share of its weight: without it the pressure of water eight layers deep is too high by a tenth of a layer,
 //! everywhere. Particles of a moving surface do not have it: a film that runs along a floor would gain energy
