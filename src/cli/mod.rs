@@ -100,7 +100,9 @@ fn with_known_words(mut error: clap::Error) -> clap::Error {
         error.insert(ContextKind::SuggestedSubcommand, ContextValue::Strings(vec![name]));
     }
     let flag = text(&error, ContextKind::InvalidArg);
-    if matches!(flag.as_deref(), Some("--resolution" | "--res" | "--grid")) {
+    // the usage names the command
+    let meshes = error.get(ContextKind::Usage).is_some_and(|usage| usage.to_string().contains("rfm mesh "));
+    if meshes && matches!(flag.as_deref(), Some("--resolution" | "--res" | "--grid")) {
         error.insert(ContextKind::SuggestedArg, ContextValue::String("--cells".into()));
         // it shows the flag that merely looks alike
         error.remove(ContextKind::Usage);

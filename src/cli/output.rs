@@ -11,7 +11,7 @@ use std::sync::Mutex;
 use serde::Serialize;
 
 use rfm::diagnostic::{is_hidden, printable, printable_line};
-use rfm::sph::Parameters;
+use rfm::sph::{Method, Parameters};
 
 use super::failure::{Failure, complain};
 
@@ -253,9 +253,12 @@ pub(super) fn significant(figure: f64, digits: usize) -> String {
 
 /// The speed of sound of a scene, and whether it is stated.
 pub(super) fn sound_speed(parameters: &Parameters) -> String {
-    let origin = match parameters.states_sound_speed() {
-        true => "stated",
-        false => "derived: ten times the greatest speed that is foreseen",
+    let origin = match (parameters.states_sound_speed(), &parameters.method) {
+        (true, _) => "stated",
+        (false, Method::Paper(_)) => "the root of the stiffness",
+        (false, Method::Wcsph(_) | Method::Dfsph(_)) => {
+            "derived: ten times the greatest speed that is foreseen"
+        }
     };
     format!("{} m/s ({origin})", significant(parameters.sound_speed(), 3))
 }

@@ -61,8 +61,8 @@ impl Driven {
 /// its normal, or the whole if the fluid sticks to it; `belt` is its motion within the surface where that is
 /// stated. A surface with the acceleration a raises pressures up to ρ·a·L over a length L, that of the box or
 /// of some bodies, as a speed of √(a·L) does: otherwise a body that swings fast over a short way would drive
-/// a fluid whose sound is so slow that it resounds. A wall that drags the fluid along does the same in a closed
-/// vessel, where the fluid returns elsewhere. Zero for a solid at rest.
+/// a fluid whose sound is so slow that it resounds. A wall that drags the fluid along does the same where the fluid
+/// returns elsewhere, as it does in a closed vessel. Whether it does is not known here. Zero for a solid at rest.
 ///
 /// The speed is found at some places and times, so a wall that moves only during a hundredth of the run may
 /// be missed. Solids of many parts are not looked at: their gradients would be one large program, which

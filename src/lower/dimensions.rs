@@ -32,8 +32,7 @@ impl Measure {
             }
             (_, "r" | "R" | "h" | "radius" | "thickness" | "d" | "z0" | "z1" | "centre" | "min" | "max")
             | ("ellipsoid", "a" | "b" | "c")
-            | ("half_space", "point")
-            | ("layer", "low" | "high") => Self::Length,
+            | ("half_space", "point") => Self::Length,
             _ => Self::Any,
         }
     }
@@ -45,7 +44,8 @@ impl Measure {
             Self::Any => true,
             Self::Count => is_plain,
             Self::TurnsPerLength => is_plain || found == Dimension::PER_LENGTH,
-            Self::Factor => is_plain || found == Dimension::LENGTH,
+            // one over the side of a body makes it a metre long
+            Self::Factor => is_plain || found == Dimension::LENGTH || found == Dimension::PER_LENGTH,
             // an angle times a length is the length of an arc
             Self::Length => is_plain || without_angle(found) == Dimension::LENGTH,
             Self::Angle => is_plain || found == Dimension::ANGLE,
@@ -76,7 +76,7 @@ impl Lowering<'_> {
             ExprKind::Name(name) => {
                 let is_local = self.scope.locals.iter().any(|local| local.name == *name);
                 let key = (self.scope.source, name.clone());
-                self.dimensions.get(&key).copied().filter(|_| !is_local)
+                self.dimensions.get(&key).map(|known| known.dimension).filter(|_| !is_local)
             }
             ExprKind::Negate(inner) => self.dimension(inner),
             ExprKind::Sum { first, rest } => {
@@ -125,14 +125,11 @@ impl Lowering<'_> {
         self.dimension(value).filter(|found| SIMPLE.contains(found))
     }
 
-    /// The dimension of a factor. Small whole numbers, their halves and π count; other plain numbers may stand for
-    /// a quantity in SI units, as 1000 does for the density of water.
+    /// The dimension of a factor. One, two and π count; other plain numbers may stand for a quantity in SI units,
+    /// as 1000 does for the density of water.
     fn factor_dimension(&self, factor: &Expr) -> Option<Dimension> {
-        const LARGEST_COUNT: f64 = 9.0;
         match &factor.kind {
-            ExprKind::Number(number) if (2.0 * number).fract() == 0.0 && number.abs() <= LARGEST_COUNT => {
-                Some(Dimension::NONE)
-            }
+            ExprKind::Number(number) if [1.0, 2.0].contains(number) => Some(Dimension::NONE),
             ExprKind::Name(name) if name == "pi" => Some(Dimension::NONE),
             _ => self.dimension(factor),
         }
@@ -169,6 +166,13 @@ impl Lowering<'_> {
             return parts.iter().all(|part| self.measures(part, wanted));
         }
         let Some(found) = self.dimension(expr).filter(|found| !wanted.admits(*found)) else { return true };
+        // turns are an angle over 2π, which has the dimension of an angle here
+        let counts_turns = matches!(wanted, Measure::Count | Measure::TurnsPerLength)
+            && matches!(expr.kind, ExprKind::Product { .. })
+            && wanted.admits(without_angle(found));
+        if counts_turns {
+            return true;
+        }
         if expr.span.source == SourceId::Prelude {
             return true;
         }
@@ -218,5 +222,42 @@ fn kind(dimension: Dimension) -> String {
             Some(unit) => format!("a quantity in {unit}"),
             None => "a quantity of another kind".into(),
         },
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::Program;
+
+    /// Formulas in which units cancel, or in which a plain number may have one.
+    #[test]
+    fn what_may_be_right_is_accepted() {
+        for text in [
+            "solid s = layer(atan2(y, x), 0 deg, 30 deg) and box()",
+            "param step = 30 deg\nsolid s = sphere(0.1).move([1, 0, 0]).polar_repeat(2*pi/step)",
+            "param a = 90 deg\nsolid s = box([0, 0, 0], [1, 0.1, 1]).twist(a/(2*pi))",
+            "param side = 20 mm\nsolid s = box().scale(1/side).scale(side)",
+            "param s0 = 5 mm\nsolid s = box().rotate_z(5*s0)",
+            "param v = 2 m/s\nsolid s = sphere(1).move([0.5*v, 0, 0])",
+            "param r = 5 mm\nsolid s = sphere(2*r + 1) and cylinder(2*pi*r, 1)",
+            "param stroke = 5 cm\nlet speed = 2*stroke\nscene q { box { max: [1, 1, 1] }
+               fluid water { shape: z <= 0.5, velocity: [speed, 0, 0] } run { until: 1 s } }",
+        ] {
+            let program = Program::from_source("units.rfm", format!("rfm 1\n{text}"));
+            assert!(program.is_ok(), "{text}: {:?}", program.err());
+        }
+    }
+
+    #[test]
+    fn what_cannot_be_right_is_refused() {
+        for text in [
+            "solid s = box().twist(90 deg)",
+            "param a = 90 deg\nsolid s = box().twist(a)",
+            "solid s = sphere(2 mm + 30 deg)",
+            "param r = 5 mm\nsolid s = box().rotate_z(2*r)",
+            "param m = 3 kg\nsolid s = sphere(2*m)",
+        ] {
+            assert!(Program::from_source("units.rfm", format!("rfm 1\n{text}")).is_err(), "{text}");
+        }
     }
 }

@@ -253,10 +253,15 @@ fn transformed(name: &str, a: &[&str]) -> Option<Words> {
         [_, _, ..] => shape_and_rest(a),
     };
     let example = match call {
+        Some((shape, how)) if method == "rotate" && how.contains(", [") && !how.starts_with('[') => {
+            // the angle first, as in OpenSCAD
+            let (angle, axis) = how.split_once(", ")?;
+            format!("{shape}.rotate({axis}, {})", foreign::in_degrees(angle))
+        }
         Some((shape, how)) => match how.rsplit_once("], ") {
             // an axis or a normal, and then an angle or a point
             Some((first, second)) => format!("{shape}.{method}({first}], {})", foreign::in_degrees(second)),
-            None if method == "rotate" && how.contains(',') && !how.starts_with('[') => {
+            None if method == "rotate" && how.contains(',') && !how.contains(['[', '(']) => {
                 format!("{shape}{}", foreign::turned(&format!("[{how}]")))
             }
             None => format!("{shape}{}", foreign::method_call(name, &how)?),

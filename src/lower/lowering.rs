@@ -20,6 +20,14 @@ const DEEPEST_CALL: usize = 64;
 /// node.
 const EVALUATIONS_PER_NODE: usize = 4;
 
+/// The dimension of a param or name.
+#[derive(Debug, Clone, Copy)]
+pub struct KnownDimension {
+    pub dimension: Dimension,
+    /// Whether it follows from other names, and not from a unit that stands there.
+    pub is_derived: bool,
+}
+
 /// The state of a lowering.
 pub(super) struct Lowering<'a> {
     pub module: Module,
@@ -46,7 +54,7 @@ pub(super) struct Lowering<'a> {
     /// Whether the value of a `let` is read.
     pub in_let: bool,
     /// Dimensions of the params and names of each text whose units tell them.
-    pub dimensions: HashMap<(SourceId, String), Dimension>,
+    pub dimensions: HashMap<(SourceId, String), KnownDimension>,
     /// Params and names whose value has neither a unit nor π in it.
     pub bare: HashSet<String>,
     /// The method that all scenes get, whatever they state.

@@ -54,7 +54,7 @@ use crate::quantity::{Dimension, Unit, in_unit, parse_unit};
 use crate::sph::Method;
 use crate::syntax::Ast;
 use crate::syntax::ast::{Argument, Attribute, Definition, Expr, ExprKind, Function, Item, Name, Param};
-use lowering::Lowering;
+use lowering::{KnownDimension, Lowering};
 use names::{Kind, RESERVED, TIME};
 use value::Value;
 
@@ -295,9 +295,10 @@ impl<'a> Lowering<'a> {
 
     /// Remembers which names stand for a number with a unit, and which for one without.
     fn remember_units(&mut self, name: &Name, value: &Expr) {
-        let written = unit_of(value).map(|(unit, _)| unit.dimension);
-        if let Some(dimension) = written.or_else(|| self.derived_dimension(value)) {
-            self.dimensions.insert((self.scope.source, name.text.clone()), dimension);
+        let stated = unit_of(value).map(|(unit, _)| unit.dimension);
+        if let Some(dimension) = stated.or_else(|| self.derived_dimension(value)) {
+            let known = KnownDimension { dimension, is_derived: stated.is_none() };
+            self.dimensions.insert((self.scope.source, name.text.clone()), known);
         }
         if self.is_bare(value) {
             self.bare.insert(name.text.clone());

@@ -17,7 +17,8 @@ const DYNAMIC: &str =
     "`viscosity` is the dynamic one, that is the kinematic one times the density: water has `1e-3 Pa·s`";
 
 /// What there is to say to a kernel by name.
-const KERNEL: &str = "each method has its own kernel, which cannot be chosen; how far it reaches is the `support_radius` of the fluid";
+const KERNEL: &str = "each method has its own kernel, which cannot be chosen; \
+    how far it reaches is the `support_radius` of the fluid";
 
 /// Keys that other programs have in a block and this one does not, each with what takes its place.
 const ABSENT: [(&str, &[&str], &str); 9] = [
@@ -364,7 +365,9 @@ impl<'a> Lowering<'a> {
     /// Reports a name that stands for a number with a unit of another kind.
     fn dimension_fits(&mut self, name: &str, expected: Dimension, key: &str, expr: &Expr) -> bool {
         let known = self.dimensions.get(&(self.scope.source, name.to_string()));
-        let Some(found) = known.filter(|found| **found != expected) else { return true };
+        // a plain number in a product may be a quantity: `2*stroke` may be two strokes a second
+        let stated = known.filter(|known| !known.is_derived).map(|known| known.dimension);
+        let Some(found) = stated.filter(|found| *found != expected) else { return true };
         let [found, expected] = [found.unit(), expected.unit()];
         let message = match found {
             Some(found) => format!("`{name}` is in {found}, which does not fit `{key}`"),

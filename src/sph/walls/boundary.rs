@@ -340,45 +340,6 @@ impl Boundary {
         Some(whole.with_friction(friction))
     }
 
-    /// For each axis the K along it of the walls of the box that lie across it, see [`Coverage::tensor`].
-    pub fn box_moments(&self, wall: &Wall, p: DVec3) -> DVec3 {
-        let across = |axis: usize, distance: f64| {
-            let normal = DVec3::AXES[axis];
-            let face = Coverage::<()>::of_face(wall, &Face { distance, normal, mean_curvature: 0.0 });
-            normal.dot(face.tensor().to_matrix() * normal)
-        };
-        let both = |axis: usize| {
-            across(axis, p[axis] - self.domain.min[axis]) + across(axis, self.domain.max[axis] - p[axis])
-        };
-        DVec3::from_array([0, 1, 2].map(both))
-    }
-
-    /// What the walls of the box take of the kernel of a particle.
-    pub(super) fn of_box<F: Friction, B: Behind>(&self, wall: &Wall, p: DVec3) -> Coverage<F, B> {
-        let mut whole = Coverage::<F, B>::default();
-        for axis in 0..3 {
-            for (distance, side) in
-                [(p[axis] - self.domain.min[axis], 1.0), (self.domain.max[axis] - p[axis], -1.0)]
-            {
-                if distance < wall.h {
-                    let mut normal = DVec3::ZERO;
-                    normal[axis] = side;
-                    let face = Coverage::of_face(wall, &Face { distance, normal, mean_curvature: 0.0 });
-                    // most particles near walls have one wall near them
-                    if whole.part == 0.0 {
-                        whole = face;
-                    } else {
-                        whole = whole.or(&face);
-                    }
-                }
-            }
-        }
-        if self.slip == Slip::Free {
-            whole.let_slip();
-        }
-        whole
-    }
-
     /// Whether a face of an obstacle before a particle lies in a wall of the box and looks out of it. The
     /// obstacle is then assumed to continue behind that wall, as one that stands out of the box does. Neither
     /// end can be seen, and the room behind the wall would otherwise count as a notch in both.

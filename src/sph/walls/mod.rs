@@ -20,6 +20,7 @@ mod friction;
 mod kernel;
 mod layers;
 mod motion;
+mod of_box;
 mod recess;
 mod shares;
 mod symmetric;

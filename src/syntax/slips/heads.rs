@@ -148,7 +148,13 @@ impl Slip<'_> {
         let (inner, _) = self.after().lines().next()?.split_once(']')?;
         let (low, high) = inner.split_once([',', ';'])?;
         (param.starts_with("param ") && param.contains('=') && fits(&[param, inner])).then(|| {
-            let (low, high) = (low.trim(), high.trim());
+            // the bounds have the unit of the value
+            let value = param.rsplit_once('=').map_or("", |(_, value)| value.trim());
+            let unit = value.split_once(' ').map_or("", |(_, unit)| unit);
+            let [low, high] = [low, high].map(|bound| match bound.trim().parse::<f64>() {
+                Ok(_) => format!("{} {unit}", bound.trim()).trim_end().to_string(),
+                Err(_) => bound.trim().to_string(),
+            });
             self.unexpected().help(format!("a range follows `in`: write `{param} in {low} .. {high}`"))
         })
     }

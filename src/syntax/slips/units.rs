@@ -37,7 +37,13 @@ impl Slip<'_> {
             let digits: String = word.chars().filter(|c| *c != '_').collect();
             return unknown.help(format!("digits are not grouped: write `{number}{digits}`"));
         }
-        if let Some(meant) = nearest(word, foreign::UNITS_IN_FULL)
+        // a name that is merely like a unit, as `radius` is, is more likely a factor
+        let is_alike = |meant: &&str| {
+            let [word, meant] = [word, *meant].map(str::as_bytes);
+            word.last_chunk::<4>() == meant.last_chunk::<4>()
+                || word.first_chunk::<5>() == meant.first_chunk::<5>()
+        };
+        if let Some(meant) = nearest(word, foreign::UNITS_IN_FULL).filter(is_alike)
             && let Some(written) = foreign::quantity(number, meant)
         {
             return unknown.help(format!("is `{meant}` meant? write `{written}`"));

@@ -18,7 +18,9 @@ pub(super) struct Linear {
     pub parting: Symmetric,
 }
 
-/// What the walls of the box ask of a gradient of pressure: across a wall that rests the fluid is not accelerated.
+/// What the walls of the box ask of a gradient of pressure: across a wall the fluid is not accelerated, so there the
+/// pressure balances gravity. Viscosity is left out: by it the pressure would undo the damping of what moves across the
+/// wall, and a turning honey in a box that it sticks to gained speed.
 ///
 /// (Without that, gradients at a wall are those from the neighbours on one side, while the compression there knows the
 /// wall. Waves across a gap of four spacings then grow by a third in the time of sound for two support radii, faster
@@ -27,7 +29,7 @@ pub(super) struct Linear {
 pub(super) struct Held {
     /// For each axis the part of a kernel's moment across the walls that lies behind them.
     pub weight: DVec3,
-    /// The force per volume, N/m³, by which pressures balance all else.
+    /// The force per volume, N/m³, by which pressures balance gravity.
     pub push: DVec3,
 }
 

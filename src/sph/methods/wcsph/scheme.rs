@@ -51,12 +51,13 @@
 //! continued linearly by the fluid's own balance ∇p = ρ(g + viscous − a). Since a is the unknown, this is a
 //! linear system of three unknowns for each particle at a wall; the factor (1 − K)⁻¹ solves it. (Without it
 //! water at rest keeps moving along its walls, 3 cm/s in the mean after three seconds instead of 1 cm/s, and
-//! is 14 % too light at the floor.) With gradients by differences the box's own walls need no such factor: across
-//! them a is zero, which is one more condition on the gradient ([`Held`](super::linear::Held)). Spray that hits a wall has no balance, so it has no such factor, and its
+//! is 14 % too light at the floor.) With gradients by differences the walls of the box need no such factor:
+//! across them the fluid is not accelerated, which is one more condition on the gradient
+//! ([`Held`](super::linear::Held)). Spray that hits a wall has no balance, so it has no such factor, and its
 //! motion conserves energy. Particles of a surface at rest have the factor, or walls would not bear their
-//! share of its weight: without it the pressure of water eight layers deep is too high by a tenth of a layer,
-//! everywhere. Particles of a moving surface do not have it: a film that runs along a floor would gain energy
-//! by it, 0.5 % of that of a tank.
+//! share of its weight: without it the pressure of water eight layers deep is too high by a tenth of a
+//! layer, everywhere. Particles of a moving surface do not have it: a film that runs along a floor would
+//! gain energy by it, 0.5 % of that of a tank.
 //!
 //! Along walls on which it slips the flow is mirrored: the part of the kernel inside them adds as much to the
 //! viscosity as the rest.
