@@ -254,7 +254,8 @@ pub(super) struct Mesh {
     /// if it is longer]
     #[arg(long, value_name = "TIME", value_parser = seconds)]
     pub budget: Option<f64>,
-    /// Measure the mesh against the surface and the surface against the mesh: takes longer than meshing
+    /// Measure the mesh against the surface and the surface against the mesh: takes longer than meshing, and --budget
+    /// does not end it
     #[arg(long)]
     pub quality: bool,
     // the unit of the file's numbers; the help names those that there are

@@ -7,6 +7,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::{Duration, Instant};
 
 use indicatif::{ProgressBar, ProgressStyle};
+use rfm::mesh::Watch;
 
 /// Work that is over sooner needs no lines.
 const FIRST_LINE: Duration = Duration::from_secs(3);
@@ -28,6 +29,11 @@ pub(super) struct Progress {
 pub(super) fn bar(length: u64, what: &'static str) -> Progress {
     let bar = std::io::stderr().is_terminal().then(|| ProgressBar::new(length));
     progress(length, what, bar)
+}
+
+/// The progress of work that reports shares of itself, see [`Watch`].
+pub(super) fn shares(what: &'static str) -> Progress {
+    bar(1000, what)
 }
 
 fn progress(length: u64, what: &'static str, bar: Option<ProgressBar>) -> Progress {
@@ -104,6 +110,12 @@ impl Progress {
         let tenths = (10 * u128::from(position)).checked_div(self.length.into()).unwrap_or(0).min(9) as u64;
         let is_new = spent >= FIRST_LINE && self.tenths.fetch_max(tenths, Ordering::Relaxed) < tenths;
         is_new.then_some(tenths)
+    }
+}
+
+impl Watch for Progress {
+    fn progress(&self, done: f64) {
+        self.set_position((self.length as f64 * done) as u64);
     }
 }
 

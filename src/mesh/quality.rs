@@ -22,7 +22,7 @@ use super::{
     shells,
 };
 use crate::field::Field;
-use crate::mesh::{Unwatched, Watch};
+use crate::mesh::watch::{Stretch, Unwatched, Watch};
 
 /// Distances of many samples in metres, or angles of many samples in degrees.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
@@ -103,6 +103,12 @@ const BATCH: usize = 256;
 /// A triangle with a smaller radius ratio has no direction.
 const NO_DIRECTION: f64 = 1e-6;
 
+/// The part that making the finer mesh takes of the time for a [`Reference`], for the progress of it.
+const MESHING: f64 = 0.8;
+
+/// The part that the way from the mesh to the surface takes of the time to measure, for the progress of it.
+const THERE: f64 = 0.8;
+
 /// A surface against which meshes of it are measured.
 pub struct Reference<'a> {
     distance: &'a dyn Field,
@@ -126,14 +132,16 @@ impl<'a> Reference<'a> {
         watch: &dyn Watch,
     ) -> Result<Self, MeshError> {
         let finer = Grid::filling(grid.bounds(), Resolution::Spacing(0.5 * grid.spacing().min_element()));
-        let finer = dual_contouring(field, finer.as_ref().unwrap_or(grid), &Unwatched)?;
-        Ok(Self { distance, points: surface_points(&finer, distance, grid, watch), extent: extent(&finer) })
+        let meshing = Stretch { watch, from: 0.0, to: MESHING };
+        let finer = dual_contouring(field, finer.as_ref().unwrap_or(grid), &meshing)?;
+        let moving = Stretch { watch, from: MESHING, to: 1.0 };
+        Ok(Self { distance, points: surface_points(&finer, distance, grid, &moving), extent: extent(&finer) })
     }
 
     /// The distance of the point of the surface that is farthest from a mesh, in metres: no more than
     /// [`Quality::hausdorff`], and found in a small part of the time. For a mesh without triangles it is 0.
     pub fn least_distance(&self, mesh: &Mesh) -> f64 {
-        if mesh.triangles.is_empty() { 0.0 } else { surface_to_mesh(mesh, &self.points).max }
+        if mesh.triangles.is_empty() { 0.0 } else { surface_to_mesh(mesh, &self.points, &Unwatched).max }
     }
 
     /// Measures a mesh of the surface. For a mesh without triangles all distances are 0.
@@ -145,8 +153,8 @@ impl<'a> Reference<'a> {
         let own = extent(mesh);
         quality.volume_error = own.0 / self.extent.0 - 1.0;
         quality.area_error = own.1 / self.extent.1 - 1.0;
-        mesh_to_surface(mesh, self.distance, &mut quality, watch);
-        quality.from_surface = surface_to_mesh(mesh, &self.points);
+        mesh_to_surface(mesh, self.distance, &mut quality, &Stretch { watch, from: 0.0, to: THERE });
+        quality.from_surface = surface_to_mesh(mesh, &self.points, &Stretch { watch, from: THERE, to: 1.0 });
         quality
     }
 }
@@ -380,7 +388,8 @@ impl PointDistance for IndexedTriangle {
     }
 }
 
-fn surface_to_mesh(mesh: &Mesh, points: &[DVec3]) -> Distances {
+fn surface_to_mesh(mesh: &Mesh, points: &[DVec3], watch: &dyn Watch) -> Distances {
+    let share = Share::of(points.len(), watch);
     let index = RTree::bulk_load(mesh.triangles.iter().map(|&t| IndexedTriangle(corners(mesh, t))).collect());
     let parts: Vec<Sums> = points
         .par_chunks(BATCH)
@@ -390,6 +399,7 @@ fn surface_to_mesh(mesh: &Mesh, points: &[DVec3]) -> Distances {
                 let nearest = index.nearest_neighbor(p.to_array());
                 sums.add(nearest.map_or(f64::INFINITY, |t| t.distance_2(&p.to_array()).sqrt()));
             }
+            share.add(points.len());
             sums
         })
         .collect();
@@ -489,6 +499,31 @@ mod tests {
         assert!(quality.to_surface.max < 0.01, "{quality:?}");
         assert!((quality.from_surface.max - 1.0).abs() < 0.02, "{quality:?}");
         assert!(quality.hausdorff() == quality.from_surface.max);
+    }
+
+    /// Shares of all parts of the work arrive: of the finer mesh, of the points on it, and of both ways.
+    #[test]
+    fn each_part_of_the_work_shows_progress() {
+        let ball =
+            Closures { omega: |p: DVec3| 0.8 - p.length(), gradient: |p: DVec3| -p.normalize_or(DVec3::X) };
+        let grid = Grid::around(&Aabb::new(DVec3::NEG_ONE, DVec3::ONE), Resolution::Cells(16)).unwrap();
+        let mesh = marching_cubes(&ball, &grid, &Unwatched).unwrap();
+        let seen = std::sync::Mutex::new(Vec::new());
+        let watch = |done: f64| seen.lock().unwrap().push(done);
+        let shares_around = |part: f64| {
+            let seen = std::mem::take(&mut *seen.lock().unwrap());
+            assert_eq!(seen.iter().copied().fold(0.0, f64::max), 1.0);
+            [
+                seen.iter().filter(|done| **done <= part).count(),
+                seen.iter().filter(|done| **done > part).count(),
+            ]
+        };
+        let reference = Reference::new(&ball, &ball, &grid, &watch).unwrap();
+        let [meshing, moving] = shares_around(MESHING);
+        assert!(meshing > 2 && moving > 2, "{meshing} {moving}");
+        reference.measure(&mesh, &watch);
+        let [there, back] = shares_around(THERE);
+        assert!(there > 2 && back > 2, "{there} {back}");
     }
 
     #[test]

@@ -26,6 +26,23 @@ pub struct Unwatched;
 
 impl Watch for Unwatched {}
 
+/// A part of the work of another watch: from one share of it to another.
+pub(super) struct Stretch<'a> {
+    pub watch: &'a dyn Watch,
+    pub from: f64,
+    pub to: f64,
+}
+
+impl Watch for Stretch<'_> {
+    fn progress(&self, done: f64) {
+        self.watch.progress(self.from + done * (self.to - self.from));
+    }
+
+    fn is_over(&self) -> bool {
+        self.watch.is_over()
+    }
+}
+
 /// Forwards the cancellation of another watch, but reports no progress to it, because each mesh is only a
 /// part of the work.
 pub(super) struct Ends<'a>(pub &'a dyn Watch);

@@ -2,8 +2,10 @@
 
 use glam::DVec3;
 
+use super::cells::map::CellMap;
 use super::construction::Solid;
 use crate::field::{Field, GradientsMut, Points};
+use crate::geom::Aabb;
 
 /// The depth below a solid's surface, m, as a [`Field`]: minus the distance of [`Solid::contact`], so
 /// positive inside, with minus the outward unit normal as its gradient.
@@ -49,6 +51,51 @@ impl Field for Depth<'_> {
         }
         for column in [omega, x, y, z] {
             column.iter_mut().for_each(|value| *value = -*value);
+        }
+    }
+}
+
+impl Solid {
+    /// The cheapest field that has the values of [`Depth`] within `reach` of the surface in a box: [`Depth`] itself
+    /// for a few leaves, and for many a [`CellMap`], which asks only those that matter at a place. It is made for
+    /// points that lie near the surface; elsewhere it costs as much as [`Depth`].
+    pub fn depth(&self, over: Aabb, reach: f64) -> Box<dyn Field + '_> {
+        match if self.has_many_leaves() { CellMap::with_reach(self, over, reach) } else { None } {
+            Some(map) => Box::new(MappedDepth { all: Depth(self), map }),
+            None => Box::new(Depth(self)),
+        }
+    }
+}
+
+/// [`Depth`] by the leaves that matter within a map's reach.
+struct MappedDepth<'a> {
+    all: Depth<'a>,
+    map: CellMap,
+}
+
+impl MappedDepth<'_> {
+    /// The depth and its gradient, if the map knows the surface around a point.
+    fn near(&self, p: DVec3) -> Option<(f64, DVec3)> {
+        let contact = self.map.contact(p);
+        // where the derivatives say nothing the distance is 0 off the surface, too
+        let is_known = contact.distance.is_finite() && (contact.distance != 0.0 || self.map.sign(p) == 0.0);
+        is_known.then_some((-contact.distance, -contact.normal))
+    }
+}
+
+impl Field for MappedDepth<'_> {
+    fn omega(&self, p: DVec3) -> f64 {
+        self.near(p).map_or_else(|| self.all.omega(p), |found| found.0)
+    }
+
+    fn omega_grad(&self, p: DVec3) -> (f64, DVec3) {
+        self.near(p).unwrap_or_else(|| self.all.omega_grad(p))
+    }
+
+    fn omega_grad_many(&self, points: Points<'_>, out: GradientsMut<'_>) {
+        for i in 0..points.len() {
+            let (omega, gradient) = self.omega_grad(points.get(i));
+            (out.omega[i], out.x[i], out.y[i], out.z[i]) = (omega, gradient.x, gradient.y, gradient.z);
         }
     }
 }

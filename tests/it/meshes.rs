@@ -1,11 +1,12 @@
 //! Meshes of compiled solids: vertices on the surface, normals, volumes, hidden parts.
 
-use rfm::field::Closures;
+use rfm::field::{Closures, Field};
 use rfm::geom::Aabb;
 use rfm::glam::DVec3;
 use rfm::mesh::{
     Grid, Mesh, Quality, Resolution, Unwatched, check, dual_contouring, marching_cubes, measure, thin_cells,
 };
+use rfm::solid::Depth;
 use rfm::{Engine, Program, Solid};
 
 fn solid(text: &str, name: &str) -> Solid {
@@ -137,4 +138,31 @@ fn walls_and_gaps_thinner_than_a_cell_are_counted_and_thick_ones_are_not() {
         let solid = example(name);
         assert_eq!(thin_cells(&solid.twin(), &around(&solid, 96), &Unwatched).unwrap().count, 0, "{name}");
     }
+}
+
+/// Near the surface of a solid of many leaves the depth is found by those nearby, and is the same.
+#[test]
+fn depths_by_the_leaves_nearby_are_those_by_all() {
+    let text = "rfm 1\nsolid s = box([-0.1, -0.1, -0.1], [1.1, 1.1, 0.6]) \\ any i in 0..40: ball([random(1, i), random(2, i), random(3, i)], 0.1)";
+    let solid = solid(text, "s");
+    assert!(solid.has_many_leaves());
+    let grid = around(&solid, 24);
+    let mesh = dual_contouring(&*solid.surface(*grid.bounds()), &grid, &Unwatched).unwrap();
+    let near = solid.depth(*grid.bounds(), grid.spacing().x);
+    let (mut worst, mut tried) = (0.0_f64, 0);
+    for (k, p) in mesh.positions.iter().enumerate() {
+        let p = *p + 0.3 * grid.spacing().x * (k as f64).sin() * mesh.normals[k];
+        let (all, by_all) = Depth(&solid).omega_grad(p);
+        let (some, by_some) = near.omega_grad(p);
+        // beside an edge two faces may be as near
+        if by_all.distance(by_some) < 1e-6 {
+            worst = worst.max((all - some).abs());
+            tried += 1;
+        }
+    }
+    assert!(
+        worst < 1e-12 && tried * 100 > 99 * mesh.positions.len(),
+        "{worst} {tried} of {}",
+        mesh.positions.len()
+    );
 }

@@ -24,7 +24,7 @@ use rfm::mesh::{
     self, Grid, GridError, LengthUnit, Mesh, MeshError, Quality, Reference, Resolution, ThinCells, Watch,
     WriteMesh, dual_contouring, marching_cubes,
 };
-use rfm::solid::{Bounds, Depth};
+use rfm::solid::Bounds;
 use rfm::view;
 use simplified::{Simplified, simplified};
 use stopwatch::milliseconds;
@@ -250,8 +250,8 @@ pub(super) fn no_grid(error: &GridError, flag: &str, cells: usize) -> Failure {
 
 /// The mesh of a surface, without slivers if the options ask for that.
 fn meshed(solid: &Solid, surface: &dyn Field, grid: &Grid, options: &Options) -> Result<Mesh, Failure> {
-    let bar = progress::bar(1000, "meshing");
-    let mesh = options.method.mesh(surface, grid, &|part: f64| bar.set_position((1000.0 * part) as u64));
+    let bar = progress::shares("meshing");
+    let mesh = options.method.mesh(surface, grid, &bar);
     bar.finish_and_clear();
     let mut mesh =
         mesh.map_err(|error| Failure::usage(format!("cannot mesh `{}`: {error}", solid.name())))?;
@@ -270,18 +270,18 @@ fn measured(
     grid: &Grid,
     options: &Options,
 ) -> Result<(Option<Quality>, Option<Simplified>), Failure> {
-    let depth = Depth(solid);
-    let bar = progress::bar(1000, "a finer mesh");
-    let reference =
-        Reference::new(surface, &depth, grid, &|part: f64| bar.set_position((1000.0 * part) as u64));
+    // the samples lie nearer to the surface than a cell
+    let depth = solid.depth(*grid.bounds(), grid.spacing().max_element());
+    let bar = progress::shares("a finer mesh");
+    let reference = Reference::new(surface, &*depth, grid, &bar);
     bar.finish_and_clear();
     let reference = reference.map_err(Failure::usage)?;
     let found =
-        options.simplify.map(|tolerance| simplified(mesh, tolerance, &depth, &reference, options.method));
+        options.simplify.map(|tolerance| simplified(mesh, tolerance, &*depth, &reference, options.method));
     let quality = options.quality.then(|| {
         found.as_ref().and_then(|found| found.quality).unwrap_or_else(|| {
-            let bar = progress::bar(1000, "measuring");
-            let quality = reference.measure(mesh, &|part: f64| bar.set_position((1000.0 * part) as u64));
+            let bar = progress::shares("measuring");
+            let quality = reference.measure(mesh, &bar);
             bar.finish_and_clear();
             quality
         })

@@ -15,7 +15,6 @@ use super::super::progress;
 use super::table::{self, Column};
 use rfm::Solid;
 use rfm::mesh::{self, Grid, Quality, Resolution, Unwatched};
-use rfm::solid::Depth;
 
 /// Resolutions for each method. Each is twice as fine as the one before.
 const RESOLUTIONS: u32 = 4;
@@ -100,7 +99,8 @@ fn row(solid: &Solid, method: MeshMethod, cells: usize, grid: &Grid) -> Result<M
         fastest = fastest.min(started.elapsed().as_secs_f64() * 1e3);
     }
     let report = mesh::check(&mesh, &*surface);
-    let quality = mesh::measure(&mesh, &*surface, &Depth(solid), grid).map_err(Failure::usage)?;
+    let depth = solid.depth(*grid.bounds(), grid.spacing().max_element());
+    let quality = mesh::measure(&mesh, &*surface, &*depth, grid).map_err(Failure::usage)?;
     Ok(MeshFigures {
         method: method.name(),
         cells,
