@@ -318,7 +318,8 @@ fn in_obstacles(scene: &Scene, fluid: &Solid, bodies: &[Solid]) -> Vec<Diagnosti
     let out_of_them = "move the shape of the fluid out of the obstacles";
     let is_all = |taken: Option<Taken>| taken.is_some_and(|taken| taken.is_all);
     if is_all(within) || outside.is_some_and(|taken| taken.part > 0.0) && is_all(taken_by(bodies)) {
-        let message = "no particle finds room: all of the fluid's shape lies in obstacles";
+        let place = if is_all(within) { "in obstacles" } else { "in obstacles or outside of the container" };
+        let message = format!("no particle finds room: all of the fluid's shape lies {place}");
         return vec![Diagnostic::error(Code::OBSTACLE_FILLS_BOX, span, message).help(out_of_them)];
     }
     let places = [
@@ -331,8 +332,10 @@ fn in_obstacles(scene: &Scene, fluid: &Solid, bodies: &[Solid]) -> Vec<Diagnosti
     ];
     let told = places.into_iter().filter_map(|(taken, place, help)| {
         let part = taken.filter(|taken| taken.part > MUCH)?.part;
-        let message =
-            format!("{:.0} % of the fluid's shape lies {place}, where no particle is placed", 100.0 * part);
+        let message = format!(
+            "about {:.0} % of the fluid's shape lies {place}, where no particle is placed (an estimate by samples; a run counts the particles)",
+            100.0 * part
+        );
         Some(Diagnostic::warning(Code::FLUID_IN_OBSTACLE, span, message).help(help))
     });
     told.collect()

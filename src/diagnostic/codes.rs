@@ -288,7 +288,8 @@ SPINDLE = "W0423":
 it has no hole, and looks like an apple. Most often the two are exchanged: `torus(1, 0.2)` is a slender ring.";
 FLUID_IN_OBSTACLE = "W0501":
 "Part of the fluid's shape lies inside an obstacle, or outside the box or the container. Those particles are carved off before the
-run starts. `rfm check` and editors tell of it where more than a quarter of the shape is taken.";
+run starts. `rfm run` counts them. `rfm check` and editors estimate by samples how much of the shape is taken, and tell of it where
+that is more than a quarter.";
 FLUID_OUTSIDE_BOX = "W0504":
 "Part of the fluid's shape lies outside the scene's box. The fluid is filled into the part within the box, so there is
 less of it than the shape says. Make the box larger, move the shape, or cut the shape where the box ends.";

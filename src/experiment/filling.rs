@@ -411,6 +411,20 @@ impl Experiment {
         })
     }
 
+    /// How many particles were carved off for each reason that there was, as "72 in an obstacle, 3 too close to one".
+    pub(super) fn reasons(&self, carved: &Carved) -> String {
+        let (within, near) = match (&self.scene.container, self.scene.obstacles.is_empty()) {
+            (None, _) => ("in an obstacle", "too close to one"),
+            (Some(_), true) => ("outside of the container", "too close to its walls"),
+            (Some(_), false) => ("in an obstacle or outside of the container", "too close to their walls"),
+        };
+        let all =
+            [(carved.inside, within), (carved.too_close, near), (carved.outside_box, "outside the box")];
+        let told: Vec<String> =
+            all.iter().filter(|(count, _)| *count > 0).map(|(count, why)| format!("{count} {why}")).collect();
+        told.join(", ")
+    }
+
     /// A warning if obstacles took particles, with the part of the fluid that this was.
     pub(super) fn carving(
         &self,
@@ -424,14 +438,15 @@ impl Experiment {
             // a lattice that is fitted to the room beside a wall takes nothing from the fluid
             return None;
         }
-        let (within, near) = match (&self.scene.container, self.scene.obstacles.is_empty()) {
-            (None, _) => ("in an obstacle", "too close to one"),
-            (Some(_), true) => ("outside of the container", "too close to its walls"),
-            (Some(_), false) => ("in an obstacle or outside of the container", "too close to their walls"),
+        let all = lost + carved.kept;
+        let part = match 100.0 * lost as f64 / all as f64 {
+            percent if percent < 1.0 => "less than 1 %".to_string(),
+            percent => format!("{percent:.0} %"),
         };
         let mut message = format!(
-            "{lost} of the fluid's particles were carved off: {} {within}, {} {near}, {} outside the box; {} are left",
-            carved.inside, carved.too_close, carved.outside_box, carved.kept
+            "{lost} of {all} particles of the fluid ({part}) were carved off: {}; {} are left",
+            self.reasons(carved),
+            carved.kept
         );
         if let Some(off) = off {
             message += &if is_whole {

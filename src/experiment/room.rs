@@ -193,7 +193,12 @@ impl Experiment {
             SeedError::TooLarge { sites }
                 if sites.is_finite() && fluid.size_span.is_none() && self.is_covered() =>
             {
-                let message = "the shape of the fluid lies within the obstacles: none of it is free";
+                let place = if self.scene.container.is_some() {
+                    "in obstacles or outside of the container"
+                } else {
+                    "within the obstacles"
+                };
+                let message = format!("the shape of the fluid lies {place}: none of it is free");
                 Diagnostic::error(Code::OBSTACLE_FILLS_BOX, fluid.shape_span, message)
                     .help("move the shape of the fluid out of the obstacles, or make it larger")
             }
@@ -218,9 +223,13 @@ impl Experiment {
             {
                 self.too_coarse()
             }
-            SeedError::NothingLeft(_) => {
-                Diagnostic::error(Code::OBSTACLE_FILLS_BOX, fluid.shape_span, error.to_string())
-                    .help("move the shape of the fluid out of the obstacles")
+            SeedError::NothingLeft(carved) => {
+                let message = format!("no particle is left: {}", self.reasons(carved));
+                let help = match self.scene.obstacles.is_empty() {
+                    true => "move the shape of the fluid into the room that it may fill",
+                    false => "move the shape of the fluid out of the obstacles",
+                };
+                Diagnostic::error(Code::OBSTACLE_FILLS_BOX, fluid.shape_span, message).help(help)
             }
             SeedError::NoCount
             | SeedError::Jitter(_)
