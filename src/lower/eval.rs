@@ -200,37 +200,40 @@ impl Lowering<'_> {
                     Diagnostic::error(Code::NOT_A_FUNCTION, span, message).help(format!("write `{name}(…)`")),
                 )
             }
-            None if self.diagnostics.len() > MOST_SUGGESTIONS => {
-                self.fail(Diagnostic::error(Code::UNKNOWN_NAME, span, format!("unknown name `{name}`")))
+            None => self.unknown_name(name, span),
+        }
+    }
+
+    /// The message for a name that nothing has, with what may be meant.
+    fn unknown_name(&mut self, name: &str, span: Span) -> Value {
+        let diagnostic = Diagnostic::error(Code::UNKNOWN_NAME, span, format!("unknown name `{name}`"));
+        if self.diagnostics.len() > MOST_SUGGESTIONS {
+            return self.fail(diagnostic);
+        }
+        let later = self.names.defined_later(self.scope.source, name);
+        let diagnostic = match (later, foreign::value(name, self.in_scene)) {
+            (Some(later), _) => diagnostic
+                .at("not defined above")
+                .label(later, "defined here")
+                .help("a name means what was defined above it: move this line down, or that one up"),
+            (None, Some(_)) if self.against_place && matches!(name, "r" | "R") => {
+                diagnostic.at("not defined above").help(format!(
+                    "define it above: write `let {name} = 1`, or `param {name} = 1` for what `-D {name}=2` may set"
+                ))
             }
-            None => {
+            (None, None) if name.len() > 1 && parse_unit(name).is_some() => {
+                diagnostic.at("a unit stands behind a number").help(format!("write `1 {name}`"))
+            }
+            (None, Some(help)) => diagnostic.at("not defined above").help(help),
+            (None, None) => {
                 let candidates = self.names.candidates(self.scope.source, false);
                 let locals: Vec<String> = self.scope.locals.iter().map(|l| l.name.clone()).collect();
                 let all =
                     candidates.iter().chain(&locals).map(String::as_str).chain(["x", "y", "z", "t", "pi"]);
-                let diagnostic =
-                    Diagnostic::error(Code::UNKNOWN_NAME, span, format!("unknown name `{name}`"));
-                let diagnostic =
-                    match (self.names.defined_later(self.scope.source, name), foreign::value(name)) {
-                        (Some(later), _) => {
-                            diagnostic.at("not defined above").label(later, "defined here").help(
-                                "a name means what was defined above it: move this line down, or that one up",
-                            )
-                        }
-                        (None, Some(_)) if self.against_place && matches!(name, "r" | "R") => {
-                            diagnostic.at("not defined above").help(format!(
-                                "define it above: write `let {name} = 1`, or `param {name} = 1` for what `-D {name}=2` may set"
-                            ))
-                        }
-                        (None, None) if name.len() > 1 && parse_unit(name).is_some() => diagnostic
-                            .at("a unit stands behind a number")
-                            .help(format!("write `1 {name}`")),
-                        (None, Some(help)) => diagnostic.at("not defined above").help(help),
-                        (None, None) => diagnostic.at("not defined above").suggest(name, all),
-                    };
-                self.fail(diagnostic)
+                diagnostic.at("not defined above").suggest(name, all)
             }
-        }
+        };
+        self.fail(diagnostic)
     }
 
     pub fn negate(&mut self, value: &Value, span: Span) -> Value {

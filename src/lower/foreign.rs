@@ -43,7 +43,7 @@ impl Lowering<'_> {
     /// The message for `math.pi` and the like; `None` if something here has the name of the module.
     pub fn value_of_a_module(&self, module: &Expr, name: &Name) -> Option<Diagnostic> {
         let diagnostic = self.function_of_a_module(module, name, &[])?;
-        let help = if name.text == "pi" { Some("write `pi`") } else { value(&name.text) };
+        let help = if name.text == "pi" { Some("write `pi`") } else { value(&name.text, self.in_scene) };
         help.map(|help| diagnostic.at("values stand alone here").help(help))
     }
 
@@ -88,8 +88,9 @@ impl Lowering<'_> {
 /// What functions of mathematics belong to elsewhere.
 const MODULES: [&str; 8] = ["math", "Math", "cmath", "np", "numpy", "std", "glm", "torch"];
 
-/// The help for a value that other languages have; `None` if the name is not known from there.
-pub(super) fn value(name: &str) -> Option<&'static str> {
+/// The help for a value that other languages have, in a scene or outside of one; `None` if the name is not known from
+/// there.
+pub(super) fn value(name: &str, in_scene: bool) -> Option<&'static str> {
     Some(match name {
         "PI" | "M_PI" | "Pi" | "π" => "write `pi`",
         "tau" | "TAU" | "M_TAU" | "τ" => "write `2*pi`",
@@ -97,6 +98,9 @@ pub(super) fn value(name: &str) -> Option<&'static str> {
         "X" => "write `x`",
         "Y" => "write `y`",
         "Z" => "write `z`",
+        "auto" | "automatic" | "default" if !in_scene => {
+            "nothing is chosen for a shape: write a number; a param has a value that `-D` changes, as in `param r = 0.5`"
+        }
         "auto" | "automatic" | "default" => {
             "leave the key out: what is chosen then is told by `rfm explain KEY`"
         }

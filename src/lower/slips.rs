@@ -209,10 +209,9 @@ impl Lowering<'_> {
     /// Warns of an angle above a whole turn that is known now and made of a number that is usual in degrees, as in
     /// `cos(360/n*i)`.
     pub fn warn_of_degrees(&mut self, angle: f64, expr: &Expr) {
-        const USUAL: [f64; 9] = [30.0, 45.0, 60.0, 72.0, 90.0, 120.0, 180.0, 270.0, 360.0];
         let Some((number, at)) = large_number(expr).filter(|_| self.has_no_unit(expr)) else { return };
         if angle.abs() <= std::f64::consts::TAU
-            || !USUAL.contains(&number)
+            || !USUAL_IN_DEGREES.contains(&number)
             || expr.span.source != SourceId::File
         {
             return;
@@ -228,15 +227,22 @@ impl Lowering<'_> {
         self.report(Diagnostic::warning(Code::LARGE_ANGLE, at.span, message).help(help));
     }
 
-    /// Warns of a number above a whole turn in an angle that depends on t, as in `.rotate_z(45*t)`.
+    /// Warns of a number above a whole turn in an angle that depends on t, as in `.rotate_z(40*sin(t))`. In a product
+    /// with t it is a rate of turning, as in `.rotate_z(45*t)`: a number of radians per second is often that large,
+    /// so only those are reported that are usual in degrees.
     pub fn warn_of_fast_turn(&mut self, expr: &Expr) {
-        let Some((rate, at)) = large_number(expr).filter(|_| self.has_no_unit(expr)) else { return };
-        if expr.span.source != SourceId::File {
+        let Some((number, at)) = large_number(expr).filter(|_| self.has_no_unit(expr)) else { return };
+        let is_rate = is_factor_of_time(expr, at);
+        if expr.span.source != SourceId::File || is_rate && !USUAL_IN_DEGREES.contains(&number) {
             return;
         }
         let written = self.written(at).unwrap_or("…").to_string();
-        let message =
-            format!("in an angle that depends on t, {rate} rad is {:.1} turns", rate / std::f64::consts::TAU);
+        let turns = number / std::f64::consts::TAU;
+        let message = if is_rate {
+            format!("{number} rad/s is {turns:.1} turns per second")
+        } else {
+            format!("in an angle that depends on t, {number} rad is {turns:.1} turns")
+        };
         let help = format!(
             "are degrees meant? write `{}`, or `{}` for radians",
             with_unit(&written, "deg"),
@@ -344,6 +350,31 @@ pub(super) fn names_a_coordinate(expr: &Expr) -> bool {
 
 fn without_sign(expr: &Expr) -> &Expr {
     if let ExprKind::Negate(inner) = &expr.kind { inner } else { expr }
+}
+
+/// Numbers that angles in degrees usually have.
+const USUAL_IN_DEGREES: [f64; 9] = [30.0, 45.0, 60.0, 72.0, 90.0, 120.0, 180.0, 270.0, 360.0];
+
+/// Whether an expression is t, or a sum with t as in `t - 1 s`.
+fn is_time(expr: &Expr) -> bool {
+    match &expr.kind {
+        ExprKind::Name(name) => name == TIME,
+        ExprKind::Negate(inner) => is_time(inner),
+        ExprKind::Sum { first, rest } => is_time(first) || rest.iter().any(|(_, term)| is_time(term)),
+        _ => false,
+    }
+}
+
+/// Whether a number in an expression is multiplied by t.
+fn is_factor_of_time(expr: &Expr, number: &Expr) -> bool {
+    match &expr.kind {
+        ExprKind::Product { first, rest } => {
+            let factors = || std::iter::once(&**first).chain(rest.iter().map(|(_, factor)| factor));
+            factors().any(is_time) && factors().any(|factor| without_sign(factor).span == number.span)
+                || factors().any(|factor| is_factor_of_time(factor, number))
+        }
+        _ => expr.children().into_iter().any(|part| is_factor_of_time(part, number)),
+    }
 }
 
 /// Functions whose value is as large as an argument. The large number in `0.5*sin(10*t)` is no angle.

@@ -292,6 +292,9 @@ const VALUES: &[&str] = &[
     "solid s = 1/0 - x",
     "let a = 1/0\nsolid s = a - x",
     "solid s = box().rotate_z(45*t)",
+    "solid s = box().rotate_z(50*sin(t))",
+    "solid s = sphere(auto)",
+    "let r = auto\nsolid s = sphere(r)",
     "solid s = box().rotate([0, 0, 1], 360*sin(t))",
     "solid s = box().rotate_z(min(90*t, 45))",
     "solid s = sphere(1) - sphere(0.5)",
@@ -326,6 +329,8 @@ const SCENE: [(&str, &str); 5] = [
 
 const SCENES: &[&str] = &[
     "obstacle sphere(0.1)",
+    "obstacle cylinder(0.1, 0.2).move([0.5, 0.5, 0]).rotate_z(3 deg)",
+    "container box([0, 0, 0], [1, 1, 0.9])",
     "gravity: [0 0 -9.81]",
     "run { until: 1 s, dt: auto }",
     "run { until: 1 s, write_interval: 0.1 s }",
@@ -446,6 +451,38 @@ fn messages(text: &str) -> Diagnostics {
         }
     }
     all
+}
+
+#[test]
+fn rates_of_turning_in_radians_per_second_ask_nothing() {
+    for rate in ["10*t", "-200*t + 1", "7.5*(t - 1)", "t*20"] {
+        let found = messages(&format!("solid s = box().rotate_z({rate})"));
+        assert!(found.list.is_empty(), "{rate}: {found}");
+    }
+}
+
+#[test]
+fn the_solid_that_is_proposed_for_an_obstacle_can_be_pasted() {
+    let around = |obstacle: &str| {
+        format!(
+            "solid stone = box().move([5, 5, 5])\nsolid post = box()\nscene s {{\n  box {{ max: [1, 1, 1] }}\n  {obstacle}\n  fluid {{ shape: \
+             ball([0.5, 0.5, 0.7], 0.2), spacing: 5 cm }}\n}}"
+        )
+    };
+    for (block, shape, name) in [
+        ("obstacle", "sphere(0.1)", "stone2"),
+        ("obstacle", "box([0, 0, 0], [0.1, 0.1, 0.1])", "block"),
+        ("obstacle", "cylinder(0.1, 0.2).move([0.5, 0.5, 0])", "post2"),
+        ("container", "torus(0.8, 0.7).move([0.5, 0.5, 0.5])", "room"),
+    ] {
+        let refused = program(&around(&format!("{block} {shape}"))).expect_err(shape);
+        let help = refused.list[0].help.clone().unwrap_or_default();
+        let parts: Vec<&str> = help.split('`').skip(1).step_by(2).collect();
+        let [solid, entry] = parts[..] else { panic!("{help}") };
+        assert_eq!(solid, format!("solid {name} = {shape}"));
+        let mended = around(entry).replace("scene s", &format!("{solid}\nscene s"));
+        program(&mended).unwrap_or_else(|error| panic!("{mended}\n{error}"));
+    }
 }
 
 /// What a message suggests, between backticks behind the word `write`.

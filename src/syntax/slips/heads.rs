@@ -186,13 +186,23 @@ impl Slip<'_> {
     fn obstacle_by_a_shape(&self) -> Option<Diagnostic> {
         let (block, called) = self.on_its_line().trim().rsplit_once(' ')?;
         let block = last_word(block);
-        let shape = format!("{called}({})", bracketed(&self.text[self.at..])?);
+        let shape = format!("{called}{}", chain(&self.text[self.at..])?);
         let is_call = ["obstacle", "container"].contains(&block) && last_word(called) == called;
         (is_call && self.in_braces() && fits(&[&shape])).then(|| {
+            let name = self.free_name(if block == "container" { "room" } else { usual_name(called) });
             self.unexpected().help(format!(
-                "a solid has a name: write `solid post = {shape}` above the scene, and `{block} {{ solid: post }}` here"
+                "a solid has a name: write `solid {name} = {shape}` above the scene, and `{block} {{ solid: {name} }}` here"
             ))
         })
+    }
+
+    /// A name that the text does not use: as given, or with a number behind it.
+    fn free_name(&self, name: &str) -> String {
+        let is_used = |name: &str| {
+            self.text.split(|c: char| !(c.is_alphanumeric() || c == '_')).any(|word| word == name)
+        };
+        let numbered = (2..).map(|number| format!("{name}{number}"));
+        std::iter::once(name.to_string()).chain(numbered).find(|name| !is_used(name)).unwrap_or_default()
     }
 
     /// `obstacle { post }`
@@ -203,4 +213,27 @@ impl Slip<'_> {
         (["obstacle", "container"].contains(&last_word(block)) && is_name && fits(&[name]))
             .then(|| self.unexpected().help(format!("write `{} {{ solid: {name} }}`", last_word(block))))
     }
+}
+
+/// What a solid of a standard shape may be called. Shapes themselves are no free names.
+fn usual_name(shape: &str) -> &'static str {
+    match shape {
+        "sphere" | "ball" | "ellipsoid" => "stone",
+        "box" => "block",
+        "cylinder" | "cone" | "capsule" => "post",
+        "torus" => "ring",
+        "half_space" => "ground",
+        _ => "body",
+    }
+}
+
+/// The arguments in brackets at the start of a text, with the methods behind them.
+fn chain(text: &str) -> Option<&str> {
+    let mut end = bracketed(text)?.len() + 2;
+    while let Some(method) = text[end..].strip_prefix('.') {
+        let name = method.find(|c: char| !(c.is_alphanumeric() || c == '_')).unwrap_or(method.len());
+        let Some(arguments) = bracketed(&method[name..]) else { break };
+        end += 1 + name + arguments.len() + 2;
+    }
+    Some(&text[..end])
 }
