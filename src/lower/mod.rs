@@ -298,6 +298,9 @@ impl<'a> Lowering<'a> {
         let stated = unit_of(value).map(|(unit, _)| unit.dimension);
         if let Some(dimension) = stated.or_else(|| self.derived_dimension(value)) {
             let known = KnownDimension { dimension, is_derived: stated.is_none() };
+            if self.scope.source == SourceId::File {
+                self.module.dimensions.insert(name.text.clone(), dimension);
+            }
             self.dimensions.insert((self.scope.source, name.text.clone()), known);
         }
         if self.is_bare(value) {

@@ -1,11 +1,11 @@
 //! A file after lowering: its graph, and what the file defines in it.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 
 use super::scene::{Scene, Tolerance};
 use crate::diagnostic::Span;
 use crate::ir::{Graph, Node};
-use crate::quantity::{Unit, in_unit};
+use crate::quantity::{Dimension, Unit, in_unit};
 
 /// What a file defines, after lowering.
 #[derive(Debug, Clone, Default)]
@@ -21,6 +21,8 @@ pub struct Module {
     pub solids: Vec<NamedSolid>,
     /// The scenes, in the order of the file.
     pub scenes: Vec<Scene>,
+    /// Dimensions of those params and names of the file, imports apart, whose units tell them.
+    pub dimensions: BTreeMap<String, Dimension>,
 }
 
 /// A `param` with the value that it has in this lowering.

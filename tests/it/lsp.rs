@@ -261,10 +261,12 @@ scene drop {
     assert!(words.contains("how wide it is") && words.contains("in m"), "{words}");
     let words = editor.hover(4, 5);
     assert!(
-        words.contains("let low = (x - r)/2") && words.contains("-0.0025 … 0.4975 for (0, 0, 0) … (1, 1, 1)"),
+        words.contains("let low = (x - r)/2")
+            && words.contains("-0.0025 … 0.4975 m for (0, 0, 0) … (1, 1, 1) m"),
         "{words}"
     );
-    assert!(editor.hover(5, 8).contains("solid pair = post(-1)"));
+    let words = editor.hover(5, 8);
+    assert!(words.contains("solid pair = post(-1)") && words.contains("ω has no unit"), "{words}");
     assert!(editor.hover(3, 24).contains("cylinder(r = 1, h = 1)"));
     assert!(editor.hover(3, 38).contains("move(by)"));
     assert!(editor.hover(8, 31).contains("key `fill`"));

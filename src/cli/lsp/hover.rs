@@ -105,19 +105,23 @@ fn defined(document: &Document, mention: &Mention, place: &Range<usize>) -> Stri
     words
 }
 
+/// The range of a solid's ω, which has no unit: shapes of unlike scales are joined by it, so only its sign has
+/// a meaning.
 fn range_of_solid(document: &Document, definition: &Definition) -> Option<String> {
-    range(document.program.as_ref()?, &definition.name.text)
+    let range = range(document.program.as_ref()?, &definition.name.text, None)?;
+    Some(format!("ω {range}; ω has no unit, it is positive inside"))
 }
 
 /// The range of a name for a number or a field: as that of a solid at the end of the file.
 fn range_of_let(document: &Document, definition: &Definition) -> Option<String> {
     const NAME: &str = "shown_by_the_editor";
-    document.program.as_ref()?;
-    range(&document.with(&format!("solid {NAME} = {}", definition.name.text))?, NAME)
+    let dimension = document.program.as_ref()?.module().dimensions.get(&definition.name.text);
+    let unit = dimension.and_then(|dimension| dimension.unit());
+    range(&document.with(&format!("solid {NAME} = {}", definition.name.text))?, NAME, unit)
 }
 
-/// What ω is in the box of the scene, or around the solids of the file.
-fn range(program: &Program, name: &str) -> Option<String> {
+/// What a field is in the box of the scene, or around the solids of the file, in a unit if one is known.
+fn range(program: &Program, name: &str, unit: Option<&str>) -> Option<String> {
     let node = program.module().solids.iter().find(|solid| solid.name == name)?.node;
     let (graph, _) = program.module().graph.extract_cone(node);
     if graph.len() > MOST_OPERATIONS {
@@ -130,10 +134,12 @@ fn range(program: &Program, name: &str) -> Option<String> {
     };
     let range = solid.range(&over);
     let corner = |p: DVec3| format!("({}, {}, {})", short(p.x), short(p.y), short(p.z));
+    let unit = unit.map_or(String::new(), |unit| format!(" {unit}"));
     Some(if range.lo == range.hi {
-        format!("= {}", range.lo)
+        format!("= {}{unit}", range.lo)
     } else if range.lo.is_finite() || range.hi.is_finite() {
-        format!("{} … {} for {} … {}", short(range.lo), short(range.hi), corner(over.min), corner(over.max))
+        let (low, high) = (short(range.lo), short(range.hi));
+        format!("{low} … {high}{unit} for {} … {} m", corner(over.min), corner(over.max))
     } else {
         return None;
     })
