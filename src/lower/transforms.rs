@@ -273,14 +273,8 @@ impl<'a> Lowering<'a> {
                 Some(self.module.graph.substitute(shape, q))
             }
             Transform::RotateAbout(axis) => {
-                let [sin, cos] = self.angle(first, *at)?.factors();
-                let axis = axis as usize;
-                let (j, k) = ((axis + 1) % 3, (axis + 2) % 3);
-                let mut q = p;
-                let back = self.negative(sin, span);
-                q[j] = self.combination(&[(cos, p[j]), (sin, p[k])], span);
-                q[k] = self.combination(&[(back, p[j]), (cos, p[k])], span);
-                Some(self.module.graph.substitute(shape, q))
+                let turn = self.angle(first, *at)?;
+                Some(self.turned_about(axis, shape, turn, span))
             }
             Transform::Rotate | Transform::Mirror if values.len() > transform.needed() => {
                 let (place, place_at) = &values[transform.needed()];
@@ -313,17 +307,35 @@ impl<'a> Lowering<'a> {
             Transform::Scale => self.scale(shape, p, first, *at, span),
             Transform::Mirror => {
                 let normal = self.constant_vector(first, *at, "a normal")?;
-                let n = self.unit_vector(normal, *at)?;
-                // p − 2(p·n)n
-                let q = std::array::from_fn(|i| {
-                    let row: [(Factor, Node); 3] = std::array::from_fn(|j| {
-                        (Factor::Number(f64::from(u8::from(i == j)) - 2.0 * n[i] * n[j]), p[j])
-                    });
-                    self.combination(&row, span)
-                });
-                Some(self.module.graph.substitute(shape, q))
+                let normal = self.unit_vector(normal, *at)?;
+                Some(self.mirrored(shape, normal, span))
             }
         }
+    }
+
+    /// A shape that is turned about a coordinate axis.
+    fn turned_about(&mut self, axis: Axis3, shape: Node, turn: Turn, span: Span) -> Node {
+        let p = Axis::SPACE.map(|axis| self.module.graph.coordinate(axis));
+        let [sin, cos] = turn.factors();
+        let axis = axis as usize;
+        let (j, k) = ((axis + 1) % 3, (axis + 2) % 3);
+        let mut q = p;
+        let back = self.negative(sin, span);
+        q[j] = self.combination(&[(cos, p[j]), (sin, p[k])], span);
+        q[k] = self.combination(&[(back, p[j]), (cos, p[k])], span);
+        self.module.graph.substitute(shape, q)
+    }
+
+    /// A shape that is mirrored at the plane through the origin with the unit normal `n`: p − 2(p·n)n.
+    fn mirrored(&mut self, shape: Node, n: [f64; 3], span: Span) -> Node {
+        let p = Axis::SPACE.map(|axis| self.module.graph.coordinate(axis));
+        let q = std::array::from_fn(|i| {
+            let row: [(Factor, Node); 3] = std::array::from_fn(|j| {
+                (Factor::Number(f64::from(u8::from(i == j)) - 2.0 * n[i] * n[j]), p[j])
+            });
+            self.combination(&row, span)
+        });
+        self.module.graph.substitute(shape, q)
     }
 
     /// The transformation about a place instead of the origin.

@@ -36,19 +36,7 @@ pub(super) fn measure(
         Bounds::Within(bounds) => bounds,
         Bounds::Unbounded => return Ok((facts, ThinCells::NONE)),
         Bounds::Empty => {
-            let zero = Some(0.0);
-            let facts = Facts {
-                empty: true,
-                volume: zero,
-                volume_error: zero,
-                area: zero,
-                area_error: zero,
-                components: Some(0),
-                resolved: Some(true),
-                thin_cells: Some(0),
-                ..facts
-            };
-            return Ok((facts, ThinCells::NONE));
+            return Ok((of_nothing(facts), ThinCells::NONE));
         }
     };
     facts.bounds = Some(Box3::of(bounds));
@@ -67,31 +55,14 @@ pub(super) fn measure(
             return Ok((facts, ThinCells::NONE));
         }
     };
-    let mut shows_nothing = false;
     if triangles.is_some() {
         let thin = thin_cells(solid, &*surface, &grid, deadline, notes);
         tell_of_end(solid, thin, &mut facts, notes);
         return Ok((facts, thin.unwrap_or(ThinCells::NONE)));
     }
-    match mesh::volume(&*surface, bounds, VOLUME_CELLS, deadline) {
-        Ok(found) => take(&found, VOLUME_CELLS, &mut facts),
-        Err(VolumeError::TooThin) => {
-            let why = format!("it is empty, or too thin for {VOLUME_CELLS} cells along its longest side");
-            facts.no_volume = Some(why + &uneven_sides(bounds).unwrap_or_default());
-            shows_nothing = true;
-        }
-        Err(error @ VolumeError::TooFewCells(_)) => return Err(Failure::usage(error)),
-        Err(VolumeError::Grid(error)) => return Err(Failure::usage(error)),
-        Err(VolumeError::Mesh(MeshError::Ended)) => {
-            facts.unfinished.push("volume");
-            facts.no_volume = Some("its meshes were not finished in time; --budget gives more of it".into());
-        }
-        Err(VolumeError::Mesh(
-            error @ (MeshError::NotANumber { .. } | MeshError::TooManyVertices { .. }),
-        )) => {
-            facts.no_volume = Some(error.to_string());
-            return Ok((facts, ThinCells::NONE));
-        }
+    let by_meshes = by_meshes(&*surface, bounds, deadline, &mut facts)?;
+    if by_meshes == ByMeshes::Impossible {
+        return Ok((facts, ThinCells::NONE));
     }
     let thin = thin_cells(solid, &*surface, &grid, deadline, notes);
     tell_of_end(solid, thin, &mut facts, notes);
@@ -105,8 +76,66 @@ pub(super) fn measure(
         refine((solid, &*surface, bounds), (&grid, thin), deadline, (&mut facts, notes));
     }
     // a part too thin for a cell would have been found
-    facts.shows_nothing = shows_nothing && thin.is_some_and(|thin| thin.count == 0 && !thin.ended);
+    facts.shows_nothing =
+        by_meshes == ByMeshes::ShowNothing && thin.is_some_and(|thin| thin.count == 0 && !thin.ended);
     Ok((facts, thin.unwrap_or(ThinCells::NONE)))
+}
+
+/// What is known of a solid that is empty.
+fn of_nothing(facts: Facts) -> Facts {
+    let zero = Some(0.0);
+    Facts {
+        empty: true,
+        volume: zero,
+        volume_error: zero,
+        area: zero,
+        area_error: zero,
+        components: Some(0),
+        resolved: Some(true),
+        thin_cells: Some(0),
+        ..facts
+    }
+}
+
+/// What came of the meshes that show the volume.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum ByMeshes {
+    /// The volume, or a part of the work at the deadline.
+    Measured,
+    /// No part of the solid.
+    ShowNothing,
+    /// The solid cannot be meshed.
+    Impossible,
+}
+
+/// Measures the volume and the area on meshes with the usual number of cells.
+fn by_meshes(
+    surface: &dyn Field,
+    bounds: &Aabb,
+    deadline: &Deadline,
+    facts: &mut Facts,
+) -> Result<ByMeshes, Failure> {
+    match mesh::volume(surface, bounds, VOLUME_CELLS, deadline) {
+        Ok(found) => take(&found, VOLUME_CELLS, facts),
+        Err(VolumeError::TooThin) => {
+            let why = format!("it is empty, or too thin for {VOLUME_CELLS} cells along its longest side");
+            facts.no_volume = Some(why + &uneven_sides(bounds).unwrap_or_default());
+            return Ok(ByMeshes::ShowNothing);
+        }
+        Err(error @ VolumeError::TooFewCells(_)) => return Err(Failure::usage(error)),
+        Err(VolumeError::Grid(error)) => return Err(Failure::usage(error)),
+        Err(VolumeError::Mesh(MeshError::Ended)) => {
+            facts.unfinished.push("volume");
+            facts.no_volume = Some("its meshes were not finished in time; --budget gives more of it".into());
+        }
+        Err(VolumeError::Mesh(
+            error @ (MeshError::NotANumber { .. } | MeshError::TooManyVertices { .. }),
+        )) => {
+            facts.no_volume = Some(error.to_string());
+            return Ok(ByMeshes::Impossible);
+        }
+    }
+    Ok(ByMeshes::Measured)
 }
 
 /// What there is to ask of bounds with a side that is far longer than another, as in `box([0, 0, 0], [10 mm, 20 mm, 5])`.

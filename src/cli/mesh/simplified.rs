@@ -53,6 +53,29 @@ const COARSE: f64 = 0.2;
 /// of them lie a few hundredths further off.
 const AIMS: [f64; 3] = [0.9, 0.75, 0.5];
 
+/// Reports a tolerance, m, that is as large as the mesh is thick.
+fn warn_of_coarse(mesh: &Mesh, tolerance: f64) {
+    let bounds = mesh.positions.iter().fold(Aabb::EMPTY, |bounds, p| bounds.including(*p));
+    let thickness = bounds.size().min_element();
+    if tolerance > COARSE * thickness {
+        note(format!(
+            "--simplify allows {tolerance:.2e} m, and the mesh is only {thickness:.2e} m thick: little is left of its shape"
+        ));
+    }
+}
+
+/// Says that a mesh is farther from the surface than it may be after simplification, both in metres.
+fn say_too_far(distance: f64, tolerance: f64, method: MeshMethod) {
+    let advice = match method {
+        MeshMethod::Mc => "try more cells, or --method dc for sharp edges",
+        MeshMethod::Dc => "try more cells",
+    };
+    note(format!(
+        "the mesh is {distance:.2e} m from the surface as it is, more than the {tolerance:.2e} m asked for, so all \
+         triangles are kept; {advice}"
+    ));
+}
+
 /// Simplifies a mesh as far as the tolerance allows. If its own distance is larger, or the measured one is too large
 /// at every aim, the mesh stays as it was.
 pub(super) fn simplified(
@@ -62,34 +85,20 @@ pub(super) fn simplified(
     reference: &Reference<'_>,
     method: MeshMethod,
 ) -> Simplified {
-    let tolerance = tolerance.of(mesh);
-    let bounds = mesh.positions.iter().fold(Aabb::EMPTY, |bounds, p| bounds.including(*p));
-    let thickness = bounds.size().min_element();
-    if tolerance > COARSE * thickness {
-        note(format!(
-            "--simplify allows {tolerance:.2e} m, and the mesh is only {thickness:.2e} m thick: little is left of its shape"
-        ));
-    }
-    let from = mesh.triangles.len();
-    let advice = match method {
-        MeshMethod::Mc => "try more cells, or --method dc for sharp edges",
-        MeshMethod::Dc => "try more cells",
-    };
+    let (tolerance, from) = (tolerance.of(mesh), mesh.triangles.len());
+    warn_of_coarse(mesh, tolerance);
     // asked first, because contracting edges and measuring what comes of it take most of the time
     let started = Instant::now();
     let least = reference.least_distance(mesh);
     if least > tolerance {
-        note(format!(
-            "the mesh is {least:.2e} m from the surface as it is, more than the {tolerance:.2e} m asked for, so all \
-             triangles are kept; {advice}"
-        ));
+        say_too_far(least, tolerance, method);
         let measuring = milliseconds(started);
         return Simplified { quality: None, error: least, from, tolerance, simplifying: 0.0, measuring };
     }
     let (mut simplifying, mut measuring) = (0.0, milliseconds(started));
     let measure = |mesh: &Mesh, time: &mut f64| {
-        let (started, bar) = (Instant::now(), progress::bar(1000, "measuring"));
-        let quality = reference.measure(mesh, &|part: f64| bar.set_position((1000.0 * part) as u64));
+        let (started, bar) = (Instant::now(), progress::shares("measuring"));
+        let quality = reference.measure(mesh, &bar);
         bar.finish_and_clear();
         *time += milliseconds(started);
         quality
@@ -108,11 +117,7 @@ pub(super) fn simplified(
         }
         let own: &Quality = own.get_or_insert_with(|| measure(mesh, &mut measuring));
         if own.hausdorff() > tolerance {
-            note(format!(
-                "the mesh is {:.2e} m from the surface as it is, more than the {tolerance:.2e} m asked for, so all \
-                 triangles are kept; {advice}",
-                own.hausdorff()
-            ));
+            say_too_far(own.hausdorff(), tolerance, method);
             return Simplified::new(*own, (from, tolerance), (simplifying, measuring));
         }
     }

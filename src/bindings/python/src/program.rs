@@ -9,10 +9,11 @@ use pyo3::prelude::*;
 use pyo3::sync::PyOnceLock;
 use pyo3::types::{PyBytes, PyDict, PyString, PyTuple, PyType};
 use rfm::compile::{files_beside, text_of};
-use rfm::diagnostic::{Source, SourceId};
+use rfm::diagnostic::{Diagnostics, Source, SourceId};
 use rfm::files::Files;
 use rfm::lower::Options;
 use rfm::quantity::{Dimension, parse_quantity};
+use rfm::solid::Chosen;
 use rfm::{Error, Program, Solid};
 
 use crate::error::{diagnostics, not_read, of_diagnostics, raised};
@@ -114,6 +115,17 @@ pub struct PyProgram {
 }
 
 impl PyProgram {
+    /// The cheaper program of a solid that keeps the tolerance of the file; `None` if the file states none.
+    ///
+    /// # Errors
+    /// `RfmError` if no program keeps it.
+    pub fn chosen(&self, py: Python<'_>, solid: &Solid) -> PyResult<Option<Chosen>> {
+        self.program.within_tolerance(solid).transpose().map_err(|message| {
+            let sources = self.program.sources().clone();
+            of_diagnostics(py, &Diagnostics { list: vec![*message], sources })
+        })
+    }
+
     fn check(py: Python<'_>, source: Source, params: Vec<Given>) -> PyResult<Self> {
         // a text has no folder, and names no other files
         let files = if &*source.name == TEXT { Files::default() } else { files_beside(&*source.name, false) };

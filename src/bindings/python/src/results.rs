@@ -5,11 +5,29 @@ use numpy::{Element, PyArray, PyArrayDescrMethods, PyUntypedArray, PyUntypedArra
 use pyo3::exceptions::{PyTypeError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::PyTuple;
-use rfm::solid::Lane;
+use rfm::glam::DVec3;
+use rfm::solid::{Bounds, Lane};
 use rfm_columns::Column;
 
+use crate::error::refused;
 use crate::memory::{column, columns, columns_of_new, new_array};
 use crate::points::{Points, numpy};
+
+/// A vector as an array of three doubles.
+pub fn array(py: Python<'_>, vector: DVec3) -> Bound<'_, PyAny> {
+    numpy::PyArray1::from_slice(py, &vector.to_array()).into_any()
+}
+
+/// The corners of bounds as an array of shape (2, 3), m; None if they are empty.
+pub fn corners<'py>(py: Python<'py>, bounds: &Bounds) -> PyResult<Option<Bound<'py, PyAny>>> {
+    let (low, high) = match bounds {
+        Bounds::Within(found) => (found.min, found.max),
+        Bounds::Unbounded => (DVec3::NEG_INFINITY, DVec3::INFINITY),
+        Bounds::Empty => return Ok(None),
+    };
+    let corners = [low, high].map(|corner| corner.to_array().to_vec());
+    Ok(Some(numpy::PyArray2::from_vec2(py, &corners).map_err(refused)?.into_any()))
+}
 
 /// An array for one result of `N` numbers at each point: 1 for a value, 3 for a vector.
 pub struct Target<'py, T, const N: usize> {

@@ -7,21 +7,20 @@ use pyo3::types::{PyDict, PyTuple, PyType};
 use rfm::field::Field;
 use rfm::geom::Aabb;
 use rfm::glam::DVec3;
-use rfm::solid::{Bounds, Chosen};
+use rfm::solid::Chosen;
 use rfm::source::Target;
 use rfm::sph::Rebound;
 use rfm::{Solid, mesh};
 use rfm_columns::Obstacle;
 
 use crate::collision::collide;
-use crate::error::{of_diagnostics, refused};
 use crate::evaluate::ask;
 use crate::mesh::PyMesh;
 use crate::path::first_entry;
 use crate::points::aabb;
 use crate::pool::{Threads, run_watched};
 use crate::program::PyProgram;
-use crate::results::{no_out, several};
+use crate::results::{array, corners, no_out, several};
 use crate::show;
 use crate::slice::PySlice;
 use crate::source::{Asked, text};
@@ -61,16 +60,7 @@ impl PySolid {
         over: Option<Aabb>,
     ) -> PyResult<Self> {
         let solid = solid.between(from, to);
-        let file = &program.get().program;
-        let chosen = match file.within_tolerance(&solid) {
-            None => None,
-            Some(Ok(chosen)) => Some(chosen),
-            Some(Err(message)) => {
-                let sources = file.sources().clone();
-                let found = rfm::diagnostic::Diagnostics { list: vec![*message], sources };
-                return Err(of_diagnostics(program.py(), &found));
-            }
-        };
+        let chosen = program.get().chosen(program.py(), &solid)?;
         let obstacle = Obstacle::new(solid.clone(), over);
         Ok(Self { program: program.clone().unbind(), solid, stretch: [from, to], chosen, obstacle, over })
     }
@@ -83,11 +73,6 @@ impl PySolid {
     fn domain(&self) -> Option<Aabb> {
         Python::attach(|py| self.program.bind(py).get().program.domain(&self.solid))
     }
-}
-
-/// A vector as an array of three doubles.
-fn array(py: Python<'_>, vector: DVec3) -> Bound<'_, PyAny> {
-    numpy::PyArray1::from_slice(py, &vector.to_array()).into_any()
 }
 
 #[pymethods]
@@ -390,13 +375,8 @@ impl PySolid {
     /// None if the solid is empty, and infinite if no box could be proven.
     #[getter]
     fn bounds<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyAny>>> {
-        let (low, high) = match py.detach(|| *self.solid.bounds()) {
-            Bounds::Within(found) => (found.min, found.max),
-            Bounds::Unbounded => (DVec3::NEG_INFINITY, DVec3::INFINITY),
-            Bounds::Empty => return Ok(None),
-        };
-        let corners = [low, high].map(|corner| corner.to_array().to_vec());
-        Ok(Some(numpy::PyArray2::from_vec2(py, &corners).map_err(refused)?.into_any()))
+        let found = py.detach(|| *self.solid.bounds());
+        corners(py, &found)
     }
 
     /// The least and the greatest value that ω may have in a box, guaranteed.
