@@ -8,7 +8,8 @@ pub trait Watch: Sync {
     /// order.
     fn progress(&self, _done: f64) {}
 
-    /// Whether the work is to end. It looks here before each of its tasks and steps, of which the longest mend a mesh.
+    /// Whether the work is to end. It looks here before each of its tasks and steps, the longest of which evaluate a
+    /// field some ten thousand times.
     fn is_over(&self) -> bool {
         false
     }

@@ -8,8 +8,9 @@ use rustc_hash::FxHashMap;
 use smallvec::SmallVec;
 
 use super::super::{
-    Grid, Mesh, MeshError, Work,
+    Grid, Mesh, MeshError, Watch, Work,
     collapse::{self, AtNode},
+    crossings::ended,
     intersections::{Cubes, Neighbours, bounds_of, corners, crossing_pairs},
     normals,
 };
@@ -59,6 +60,8 @@ pub(super) struct Draft<'a> {
     bounds: &'a Aabb,
     /// The shortest side of a cell.
     size: f64,
+    /// May end the work.
+    watch: &'a dyn Watch,
     vertices: Vertices,
     triangles: Vec<[u32; 3]>,
     work: Work,
@@ -76,21 +79,25 @@ impl<'a> Draft<'a> {
         grid: &'a Grid,
         (vertices, triangles): (Vertices, Vec<[u32; 3]>),
         work: Work,
+        watch: &'a dyn Watch,
     ) -> Self {
         let (bounds, size) = (grid.bounds(), grid.spacing().min_element());
         let (first_cut, cut_ends) = (vertices.len(), Vec::new());
-        Self { field, bounds, size, vertices, triangles, work, care: Care::Sharp, first_cut, cut_ends }
+        Self { field, bounds, size, watch, vertices, triangles, work, care: Care::Sharp, first_cut, cut_ends }
     }
 
     /// Cuts edges until the mesh is near the surface. Returns the edges that are not near and could not be
     /// cut, ascending.
-    pub fn cut(&mut self) -> Vec<[u32; 2]> {
+    ///
+    /// # Errors
+    /// [`MeshError::Ended`].
+    pub fn cut(&mut self) -> Result<Vec<[u32; 2]>, MeshError> {
         self.first_cut = self.vertices.len();
         let Refined { left, ends, evaluations } =
-            refine::refine(self.field, &mut self.vertices, &mut self.triangles, self.size);
+            refine::refine(self.field, &mut self.vertices, &mut self.triangles, self.size, self.watch)?;
         self.work.gradients += evaluations;
         self.cut_ends = ends;
-        left
+        Ok(left)
     }
 
     /// Moves cuts back where triangles cross, if none crossed without them, and takes care from now on that none do.
@@ -248,7 +255,7 @@ impl<'a> Draft<'a> {
     /// whether that changed anything.
     ///
     /// # Errors
-    /// [`MeshError::TooManyVertices`] if refining and mending made too many.
+    /// [`MeshError::TooManyVertices`] if refining and mending made too many, and [`MeshError::Ended`].
     pub fn mend(&mut self, far: Vec<[u32; 2]>) -> Result<bool, MeshError> {
         let (share, least) = match self.care {
             Care::Sharp => (SHARP_MENDING, LEAST_SHARP_MENDING),
@@ -258,7 +265,7 @@ impl<'a> Draft<'a> {
         let merged = self.work.merged;
         let mut changes = mend::is_worth(&far, &self.triangles);
         if changes {
-            self.mend_around(far, Aim::Distance, &mut budget);
+            self.mend_around(far, Aim::Distance, &mut budget)?;
         }
         MeshError::check_vertices(self.vertices.len())?;
         self.merge_close();
@@ -269,18 +276,21 @@ impl<'a> Draft<'a> {
                 break;
             }
             changes = true;
-            self.mend_around(folded, Aim::Folds, &mut budget);
+            self.mend_around(folded, Aim::Folds, &mut budget)?;
             self.merge(0.0);
         }
         Ok(changes || self.work.merged != merged)
     }
 
-    fn mend_around(&mut self, edges: Vec<[u32; 2]>, aim: Aim, budget: &mut u64) {
+    /// # Errors
+    /// [`MeshError::Ended`].
+    fn mend_around(&mut self, edges: Vec<[u32; 2]>, aim: Aim, budget: &mut u64) -> Result<(), MeshError> {
         let place = (self.bounds, self.size, self.care);
         let patch = Patch::new(self.field, place, &mut self.vertices, &mut self.triangles, &edges);
-        let count = mend::mend(patch, edges, refine::TOLERANCE * self.size, aim, *budget);
+        let count = mend::mend(patch, edges, refine::TOLERANCE * self.size, aim, (*budget, self.watch));
         self.work.gradients += count;
         *budget = budget.saturating_sub(count);
+        ended(self.watch)
     }
 
     /// Merges vertices that coincide, and ends of short edges on creases; with care, unless triangles would cross.

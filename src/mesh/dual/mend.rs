@@ -15,7 +15,10 @@ use glam::DVec3;
 use rayon::prelude::*;
 use rustc_hash::FxHashSet;
 
-use super::super::normals::{gradients, unit};
+use super::super::{
+    Watch,
+    normals::{gradients, unit},
+};
 use super::patch::{FACING, NEAR, Pair, Patch, STEPS};
 use super::vertices::{Vertex, VertexKind, Vertices};
 use super::{crease, project};
@@ -50,14 +53,20 @@ pub(super) fn is_worth(edges: &[[u32; 2]], triangles: &[[u32; 3]]) -> bool {
     !edges.is_empty() && edges.len() as f64 <= RESOLVED * triangles.len() as f64
 }
 
-/// Mends the mesh around the given edges, which ascend, until about `budget` evaluations are spent. Returns
-/// their number.
-pub(super) fn mend(mut patch: Patch<'_>, edges: Vec<[u32; 2]>, tolerance: f64, aim: Aim, budget: u64) -> u64 {
+/// Mends the mesh around the given edges, which ascend, until about `budget` evaluations are spent or `watch` ends it.
+/// Returns their number.
+pub(super) fn mend(
+    mut patch: Patch<'_>,
+    edges: Vec<[u32; 2]>,
+    tolerance: f64,
+    aim: Aim,
+    (budget, watch): (u64, &dyn Watch),
+) -> u64 {
     let looks = MOST.min(LOOKS * edges.len());
     let mut waiting: FxHashSet<[u32; 2]> = edges.iter().copied().collect();
     let mut queue = VecDeque::from(edges);
     for _ in 0..looks {
-        if patch.count > budget {
+        if patch.count > budget || watch.is_over() {
             break;
         }
         let Some(edge) = queue.pop_front() else { break };
@@ -301,6 +310,7 @@ mod tests {
     use super::*;
     use crate::field::Closures;
     use crate::geom::Aabb;
+    use crate::mesh::Unwatched;
     use crate::mesh::dual::care::Care;
 
     const BOUNDS: Aabb = Aabb { min: DVec3::splat(-9.0), max: DVec3::splat(9.0) };
@@ -325,7 +335,7 @@ mod tests {
         let (edges, _) = folded(&floor, &vertices, &triangles, 1.0);
         assert_eq!(edges, [[1, 2], [1, 3], [2, 3]]);
         let patch = Patch::new(&floor, (&BOUNDS, 1.0, Care::Apart), &mut vertices, &mut triangles, &edges);
-        mend(patch, edges, 0.01, Aim::Folds, u64::MAX);
+        mend(patch, edges, 0.01, Aim::Folds, (u64::MAX, &Unwatched));
         assert_eq!(folded(&floor, &vertices, &triangles, 1.0).0, [[0; 2]; 0]);
         assert_eq!(triangles.len(), 2);
     }
@@ -344,7 +354,7 @@ mod tests {
         let mut triangles = vec![[1, 2, 0], [1, 0, 3]];
         let edges = vec![[0, 1]];
         let patch = Patch::new(&plate, (&BOUNDS, 1.0, Care::Apart), &mut vertices, &mut triangles, &edges);
-        mend(patch, edges, 0.025, Aim::Distance, u64::MAX);
+        mend(patch, edges, 0.025, Aim::Distance, (u64::MAX, &Unwatched));
         let farthest = vertices.positions.iter().map(|p| p.x).fold(0.0, f64::max);
         assert!((farthest - 1.0).abs() < 1e-9, "{:?}", vertices.positions);
         assert!(triangles.len() > 2);

@@ -76,10 +76,11 @@ pub fn dual_contouring(field: &dyn Field, grid: &Grid, watch: &dyn Watch) -> Res
     let crossing = Crossing::find(field, &lattice, &near, watch, &mut work)?;
     let rings = Rings::new(crossing.crossed.vertices);
     let placed_and_joined = |work: &mut Work| {
-        let (vertices, placed) = place(&crossing.placement(field, &lattice, &rings, grid.spacing()));
-        join((field, &lattice), &crossing, &rings, &placed, vertices, grid, work)
+        let (vertices, placed) = place(&crossing.placement(field, &lattice, &rings, grid.spacing()), watch)?;
+        crossings::ended(watch)?;
+        Ok(join((field, &lattice), &crossing, &rings, &placed, vertices, grid, work))
     };
-    let mut joined = placed_and_joined(&mut work);
+    let mut joined = placed_and_joined(&mut work)?;
     crossings::ended(watch)?;
     let crossings = joined.crossings();
     let is_clear = crossings.is_empty();
@@ -94,7 +95,7 @@ pub fn dual_contouring(field: &dyn Field, grid: &Grid, watch: &dyn Watch) -> Res
             kept = Some(joined);
             triangles
         };
-        match Attempt::make(Draft::new(field, grid, triangles, work), is_clear, watch)? {
+        match Attempt::make(Draft::new(field, grid, triangles, work, watch), is_clear, watch)? {
             Attempt::Clear(mesh) => return Ok(mesh),
             // without the cuts nothing crosses
             Attempt::Crossing { cut: Some((mut draft, far)), work: spent } => {
@@ -104,11 +105,11 @@ pub fn dual_contouring(field: &dyn Field, grid: &Grid, watch: &dyn Watch) -> Res
             Attempt::Crossing { cut: None, work: spent } => work = spent,
         }
     }
-    let joined = kept.unwrap_or_else(|| placed_and_joined(&mut work));
+    let joined = kept.map_or_else(|| placed_and_joined(&mut work), Ok)?;
     crossings::ended(watch)?;
-    let triangles = joined.triangles_apart(crossings, &mut work);
-    let mut draft = Draft::new(field, grid, triangles, work);
-    let far = draft.cut();
+    let triangles = joined.triangles_apart(crossings, &mut work, watch)?;
+    let mut draft = Draft::new(field, grid, triangles, work, watch);
+    let far = draft.cut()?;
     apart(draft, far, watch)
 }
 
@@ -131,7 +132,7 @@ impl<'a> Attempt<'a> {
     /// # Errors
     /// Those of [`Draft::mend`], and [`MeshError::Ended`].
     fn make(mut draft: Draft<'a>, is_clear: bool, watch: &dyn Watch) -> Result<Self, MeshError> {
-        let far = draft.cut();
+        let far = draft.cut()?;
         let is_long = far.len() > draft.triangle_count() / CHECKED;
         let may_cross = draft.is_cut() || !is_clear;
         let crossing = if is_long && may_cross { draft.crossings() } else { 0 };
@@ -268,7 +269,10 @@ fn hits(
 }
 
 /// Places the vertices of all cells.
-fn place(placement: &Placement<'_>) -> (Vertices, Vec<Placed>) {
+///
+/// # Errors
+/// [`MeshError::Ended`].
+fn place(placement: &Placement<'_>, watch: &dyn Watch) -> Result<(Vertices, Vec<Placed>), MeshError> {
     let counts: Vec<usize> = sheet_counts(placement.crossed).collect();
     let mut vertices = Vertices::new(counts.iter().sum());
     let mut first = 0;
@@ -288,10 +292,11 @@ fn place(placement: &Placement<'_>) -> (Vertices, Vec<Placed>) {
         .map(|(((positions, normals), kinds), first)| Slots { first, positions, normals, kinds });
     let tasks = placement.crossed.tasks.par_iter().zip(slots);
     let placed = tasks.map_init(place::PlacementScratch::default, |scratch, (task, slots)| {
-        placement.place(task, slots, scratch)
+        crossings::ended(watch)?;
+        Ok(placement.place(task, slots, scratch))
     });
-    let placed = placed.collect();
-    (vertices, placed)
+    let placed = placed.collect::<Result<_, _>>()?;
+    Ok((vertices, placed))
 }
 
 /// The quads around all hits, cut in two, before any of them are kept apart.
@@ -326,12 +331,20 @@ impl Joined<'_> {
     }
 
     /// The vertices and triangles, moved until no triangles cross.
-    fn triangles_apart(self, crossings: Vec<[u32; 2]>, work: &mut Work) -> (Vertices, Vec<[u32; 3]>) {
+    ///
+    /// # Errors
+    /// [`MeshError::Ended`].
+    fn triangles_apart(
+        self,
+        crossings: Vec<[u32; 2]>,
+        work: &mut Work,
+        watch: &dyn Watch,
+    ) -> Result<(Vertices, Vec<[u32; 3]>), MeshError> {
         let Self { quads, cut, mut vertices, tubes } = self;
-        let mut surface = Surface { field: quads.field, size: quads.size(), gradients: 0 };
-        let triangles = secure::secure((quads, cut), &mut vertices, &tubes, &mut surface, crossings);
+        let mut surface = Surface { field: quads.field, size: quads.size(), watch, gradients: 0 };
+        let triangles = secure::secure((quads, cut), &mut vertices, &tubes, &mut surface, crossings)?;
         work.gradients += surface.gradients;
-        (vertices, triangles)
+        Ok((vertices, triangles))
     }
 }
 

@@ -10,7 +10,11 @@
 use glam::DVec3;
 use rayon::prelude::*;
 
-use super::super::normals::{GradientColumns, gradients, unit};
+use super::super::{
+    MeshError, Watch,
+    crossings::ended,
+    normals::{GradientColumns, gradients, unit},
+};
 use super::crease;
 
 use super::project;
@@ -50,12 +54,16 @@ pub(super) struct Refined {
 }
 
 /// Cuts edges until the mesh is near the surface.
+///
+/// # Errors
+/// [`MeshError::Ended`] if `watch` ends the work.
 pub(super) fn refine(
     field: &dyn Field,
     vertices: &mut Vertices,
     triangles: &mut Vec<[u32; 3]>,
     size: f64,
-) -> Refined {
+    watch: &dyn Watch,
+) -> Result<Refined, MeshError> {
     let (mut evaluations, mut ends) = (0, Vec::new());
     let mut left = Vec::new();
     // triangles whose edges have not been looked at yet
@@ -63,7 +71,7 @@ pub(super) fn refine(
     let mut changed: Vec<u32> = Vec::new();
     for _ in 0..ROUNDS {
         let others: Vec<[u32; 3]> = changed.iter().map(|&t| triangles[t as usize]).collect();
-        let found = cuts(field, vertices, (&triangles[fresh.clone()], &others), TOLERANCE * size);
+        let found = cuts(field, vertices, (&triangles[fresh.clone()], &others), TOLERANCE * size, watch)?;
         let FoundEdges { cuts, left: uncut, evaluations: count } = found;
         evaluations += count;
         left.extend(uncut);
@@ -82,7 +90,7 @@ pub(super) fn refine(
     }
     left.sort_unstable();
     left.dedup();
-    Refined { left, ends, evaluations }
+    Ok(Refined { left, ends, evaluations })
 }
 
 /// An edge's ends, ascending, and the vertex that cuts it.
@@ -98,32 +106,37 @@ struct FoundEdges {
 }
 
 /// The cuts of the edges of some triangles, ascending by their ends.
+///
+/// # Errors
+/// [`MeshError::Ended`].
 fn cuts(
     field: &dyn Field,
     vertices: &Vertices,
     (fresh, changed): (&[[u32; 3]], &[[u32; 3]]),
     tolerance: f64,
-) -> FoundEdges {
-    let parts: Vec<FoundEdges> = fresh
+    watch: &dyn Watch,
+) -> Result<FoundEdges, MeshError> {
+    let parts: Result<Vec<FoundEdges>, MeshError> = fresh
         .par_chunks(BATCH)
         .chain(changed.par_chunks(BATCH))
         .map_init(
             || (Vec::new(), GradientColumns::default()),
             |(edges, gradients), triangles| {
+                ended(watch)?;
                 edges.clear();
                 triangles.iter().for_each(|t| add_bulging(vertices, *t, tolerance, edges));
-                cuts_of(field, vertices, edges, gradients, tolerance)
+                Ok(cuts_of(field, vertices, edges, gradients, tolerance))
             },
         )
         .collect();
     let mut all = FoundEdges::default();
-    for part in parts {
+    for part in parts? {
         all.cuts.extend(part.cuts);
         all.left.extend(part.left);
         all.evaluations += part.evaluations;
     }
     all.cuts.sort_unstable_by_key(|cut| cut.0);
-    all
+    Ok(all)
 }
 
 /// The cuts among the edges that may bulge, in no particular order.

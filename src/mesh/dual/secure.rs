@@ -22,7 +22,7 @@ use std::collections::BTreeMap;
 use glam::{DVec2, DVec3};
 use smallvec::SmallVec;
 
-use super::super::intersections::crossing_pairs;
+use super::super::{MeshError, Watch, crossings::ended, intersections::crossing_pairs};
 use super::project;
 use super::quads::{Cut, NOTHING, Quad, Quads};
 use super::vertices::{Vertex, VertexKind, Vertices};
@@ -40,13 +40,16 @@ const INSET: f64 = 0.05;
 
 /// The triangles of all quads and tubes, without crossings. Adds the middles of fans and of bent sides to the vertices.
 /// `crossings` are those of [`crossings`](fn@crossings).
+///
+/// # Errors
+/// [`MeshError::Ended`] if the watch of the surface ends the work.
 pub(super) fn secure(
     (mut quads, mut cut): (Quads<'_>, Cut),
     vertices: &mut Vertices,
     tubes: &[[u32; 3]],
     surface: &mut Surface<'_>,
     mut crossings: Vec<[u32; 2]>,
-) -> Vec<[u32; 3]> {
+) -> Result<Vec<[u32; 3]>, MeshError> {
     let size = surface.size;
     let mut suspects = suspects(&quads, &cut, vertices);
     let cell_vertices = vertices.len();
@@ -62,7 +65,7 @@ pub(super) fn secure(
             ROUNDS.. => Vec::new(),
         };
         if pairs.is_empty() {
-            return triangles;
+            return Ok(triangles);
         }
         vertices.truncate(lasting);
         let mut is_marked = vec![false; lasting];
@@ -75,7 +78,7 @@ pub(super) fn secure(
         }
         mark_tunnels(tubes, &mut is_marked);
         // all others are as they were when they crossed nothing
-        suspects = retreat(&mut quads, &mut cut, vertices, &is_marked, (surface, round));
+        suspects = retreat(&mut quads, &mut cut, vertices, &is_marked, (surface, round))?;
         lasting = vertices.len();
         round += 1;
     }
@@ -199,6 +202,8 @@ pub(super) struct Surface<'a> {
     pub field: &'a dyn Field,
     /// The shortest side of a cell.
     pub size: f64,
+    /// May end the work between two points.
+    pub watch: &'a dyn Watch,
     /// Evaluations of the gradient.
     pub gradients: u64,
 }
@@ -241,24 +246,27 @@ type Sides = BTreeMap<[u32; 2], (SmallVec<[u32; 4]>, Aabb)>;
 
 /// Moves the marked vertices into their cells and makes fans of their quads, with bent sides. Returns the hits of these
 /// quads.
+///
+/// # Errors
+/// [`MeshError::Ended`].
 fn retreat(
     quads: &mut Quads<'_>,
     cut: &mut Cut,
     vertices: &mut Vertices,
     is_marked: &[bool],
     (surface, round): (&mut Surface<'_>, usize),
-) -> Vec<u32> {
+) -> Result<Vec<u32>, MeshError> {
     let touched = quads.with_corners(is_marked);
     let (cells, sides) = around(quads, &touched, is_marked);
-    into_cells(quads, vertices, cells, surface, round);
-    bend(quads, vertices, sides, surface, round);
+    into_cells(quads, vertices, cells, surface, round)?;
+    bend(quads, vertices, sides, surface, round)?;
     for quad in &touched {
         cut.triangles[2 * quad.hit as usize..][..2].fill(NOTHING);
         if let Some(rim) = quads.rim(quad) {
             cut.fans.insert(quad.hit, rim);
         }
     }
-    touched.iter().map(|quad| quad.hit).collect()
+    Ok(touched.iter().map(|quad| quad.hit).collect())
 }
 
 /// The cells of the marked vertices, and the sides that end in one: each side with the hits of the quads
@@ -286,14 +294,18 @@ fn around(quads: &Quads<'_>, touched: &[Quad], is_marked: &[bool]) -> (BTreeMap<
 }
 
 /// Moves vertices into their cells, onto the surface in the first rounds.
+///
+/// # Errors
+/// [`MeshError::Ended`].
 fn into_cells(
     quads: &Quads<'_>,
     vertices: &mut Vertices,
     cells: BTreeMap<u32, Retreat>,
     surface: &mut Surface<'_>,
     round: usize,
-) {
+) -> Result<(), MeshError> {
     for (v, Retreat { hits, count, cell }) in cells {
+        ended(surface.watch)?;
         let place = v as usize;
         if let Some(&position) = quads.tunnels.get(&v) {
             vertices.set(v, Vertex { position, normal: DVec3::ZERO, kind: VertexKind::Sharp });
@@ -317,17 +329,22 @@ fn into_cells(
             vertices.set(v, Vertex { position, normal: DVec3::ZERO, kind: VertexKind::Sharp });
         }
     }
+    Ok(())
 }
 
 /// Gives each side a vertex in its middle, in the face that it crosses.
+///
+/// # Errors
+/// [`MeshError::Ended`].
 fn bend(
     quads: &mut Quads<'_>,
     vertices: &mut Vertices,
     sides: Sides,
     surface: &mut Surface<'_>,
     round: usize,
-) {
+) -> Result<(), MeshError> {
     for (ends, (hits, face)) in sides {
+        ended(surface.watch)?;
         let &[first, second] = &hits[..] else { continue };
         let [p, q] = [first, second].map(|hit| quads.hits.get(hit));
         let halfway = p.position.midpoint(q.position);
@@ -347,6 +364,7 @@ fn bend(
             quads.middles.insert((hit, ends), middle);
         }
     }
+    Ok(())
 }
 
 /// Whether a quad lies in its envelope.

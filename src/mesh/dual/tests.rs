@@ -1,6 +1,7 @@
 //! Dual contouring as a whole, against closed forms.
 
 use std::f64::consts::PI;
+use std::sync::atomic::{AtomicU64, Ordering};
 
 use glam::DVec3;
 use proptest::prelude::*;
@@ -10,7 +11,7 @@ use super::super::{Grid, Mesh, Report, Resolution, check};
 use super::dual_contouring;
 use crate::field::{Closures, Field};
 use crate::geom::Aabb;
-use crate::mesh::Unwatched;
+use crate::mesh::{Unwatched, Watch};
 
 #[track_caller]
 fn check_in(field: &dyn Field, grid: &Grid) -> (Mesh, Report) {
@@ -204,6 +205,49 @@ fn threads_change_no_bit() {
         pool.install(|| check_in(&field, &grid))
     };
     assert_eq!(with_threads(1), with_threads(2));
+}
+
+/// Counts the evaluations between two looks at the watch.
+#[derive(Default)]
+struct Evaluations {
+    since: AtomicU64,
+    most: AtomicU64,
+    all: AtomicU64,
+}
+
+impl Evaluations {
+    fn count<T>(&self, value: T) -> T {
+        self.since.fetch_add(1, Ordering::Relaxed);
+        self.all.fetch_add(1, Ordering::Relaxed);
+        value
+    }
+}
+
+impl Watch for Evaluations {
+    fn is_over(&self) -> bool {
+        self.most.fetch_max(self.since.swap(0, Ordering::Relaxed), Ordering::Relaxed);
+        false
+    }
+}
+
+/// Details in every cell, whose triangles cross nearly everywhere.
+#[test]
+fn work_that_takes_long_looks_at_its_watch_all_along() {
+    let counted = Evaluations::default();
+    let wave = |p: DVec3| DVec3::new((90.0 * p.x).sin(), (80.0 * p.y + 3.0 * p.z).sin(), (70.0 * p.z).sin());
+    let slope = |p: DVec3| DVec3::new((90.0 * p.x).cos(), (80.0 * p.y + 3.0 * p.z).cos(), (70.0 * p.z).cos());
+    let field = Closures {
+        omega: |p: DVec3| counted.count(wave(p).element_sum()),
+        gradient: |p: DVec3| {
+            let c = slope(p);
+            counted.count(DVec3::new(90.0 * c.x, 80.0 * c.y, 3.0 * c.y + 70.0 * c.z))
+        },
+    };
+    let grid = Grid::around(&cube(1.0), Resolution::Cells(20)).unwrap();
+    dual_contouring(&field, &grid, &counted).unwrap();
+    let [most, all] = [&counted.most, &counted.all].map(|count| count.load(Ordering::Relaxed));
+    // the longest stretch joins vertices to triangles
+    assert!(most < all / 6, "{most} of {all} evaluations between two looks");
 }
 
 proptest! {
