@@ -20,6 +20,7 @@ use glam::DVec3;
 use rayon::prelude::*;
 
 mod compression;
+mod memory;
 
 pub use compression::Compression;
 
@@ -60,6 +61,10 @@ const LEAST_MOTION: f64 = 1e-3;
 /// An excess of energy, as a part of the reference, that ends a run.
 const RUINOUS_EXCESS: f64 = 1.0;
 
+/// Where walls move, as many looks one after the other must find such an excess: walls that begin to move have given
+/// next to nothing.
+const RUINOUS_LOOKS: f64 = 8.0;
+
 /// A change of the volume above this part of it is a finding.
 const MOST_VOLUME_CHANGE: f64 = 0.02;
 
@@ -95,6 +100,11 @@ pub struct Audit {
     least: f64,
     /// Work of walls since the last look, J.
     given: f64,
+    /// The energy at the start, or what walls must at least give to be judged, and the amounts of what they gave or
+    /// took since, J.
+    supplied: f64,
+    /// The number of looks, one after the other, that found more energy from nowhere than that.
+    ruinous_looks: f64,
     /// What the errors of roughly known work may have added to the energy since it was least, J.
     allowed: f64,
     /// The mean of what it is so since the last look, J.
@@ -235,6 +245,8 @@ impl Audit {
             by_walls: 0.0,
             least: 0.0,
             given: 0.0,
+            supplied: reference,
+            ruinous_looks: 0.0,
             allowed: 0.0,
             gained: 0.0,
             is_moved,
@@ -292,7 +304,12 @@ impl Audit {
                 self.reference = self.reference.max(energy + height);
                 self.gained += gained / LOOK as f64;
                 if core.steps.is_multiple_of(LOOK) {
-                    self.look_at_gain(parameters.surface_tension);
+                    let by_nothing = self.look_at_gain(parameters.surface_tension).unwrap_or(0.0);
+                    let is_ruinous = by_nothing > RUINOUS_EXCESS;
+                    self.ruinous_looks = if is_ruinous { self.ruinous_looks + 1.0 } else { 0.0 };
+                    if self.ruinous_looks >= RUINOUS_LOOKS {
+                        return Err(core.energy_doubled(by_nothing, true));
+                    }
                 }
             } else {
                 // gravity that turns may bring in more than there was, and one that grows makes a depth worth more
@@ -303,7 +320,7 @@ impl Audit {
                 let excess = gained / self.reference;
                 (self.now.excess, self.excess) = (excess, self.excess.max(excess));
                 if excess > RUINOUS_EXCESS {
-                    return Err(core.energy_doubled(excess));
+                    return Err(core.energy_doubled(excess, false));
                 }
             }
         }
@@ -320,8 +337,10 @@ impl Audit {
     }
 
     /// Judges the mean gain of the last steps where walls move. Their work is found for several steps at a
-    /// time, and its errors add up over a long run: they are no reason to end it.
-    fn look_at_gain(&mut self, surface_tension: f64) {
+    /// time, and its errors add up over a long run: so that they are no reason to end it, what came from nowhere is
+    /// compared with all the energy that walls have moved. Returns it as a part of that and of the energy at the start;
+    /// `None` while there is neither.
+    fn look_at_gain(&mut self, surface_tension: f64) -> Option<f64> {
         let (gained, given) = (std::mem::take(&mut self.gained), std::mem::take(&mut self.given));
         if self.is_rough {
             self.allowed += ROUGHNESS * given.abs();
@@ -330,8 +349,13 @@ impl Audit {
         if surface_tension == 0.0 && gained <= self.least + self.allowed {
             (self.least, self.allowed) = (gained, 0.0);
         }
-        let excess = (gained - self.least - self.allowed) / self.reference;
+        let by_nothing = gained - self.least - self.allowed;
+        let excess = by_nothing / self.reference;
         (self.now.excess, self.excess) = (excess, self.excess.max(excess));
+        self.supplied += given.abs();
+        // a gravity that turns brings in more than the height at the start
+        let supplied = self.supplied + (self.work - self.by_walls - self.height).max(0.0);
+        (supplied > 0.0).then(|| by_nothing / supplied)
     }
 
     /// The greatest excess of the energy over that at the start and the work of gravity and walls, as a part
@@ -447,108 +471,6 @@ impl Audit {
             .into_iter()
             .filter(|(finding, _)| !std::mem::replace(&mut self.told[*finding as usize], true))
             .collect()
-    }
-
-    /// The audit as numbers, for a checkpoint.
-    pub(super) fn memory(&self) -> Vec<f64> {
-        let Compression { mean, p99, largest } = self.compression;
-        let DVec3 { x, y, z } = self.places;
-        let told = self.told.map(|told| f64::from(u8::from(told)));
-        let numbers = [
-            self.reference,
-            self.height,
-            self.least,
-            self.gained,
-            self.at_start,
-            self.work,
-            self.by_walls,
-            self.power,
-            x,
-            y,
-            z,
-            self.excess,
-            self.volume_at_start,
-            self.volume_change,
-            mean,
-            p99,
-            largest,
-            self.max_speed,
-            self.liveliest,
-            self.given,
-            self.allowed,
-        ];
-        let now = self.now;
-        let Compression { mean, p99, largest } = now.compression;
-        let now = [now.excess, now.volume_change, mean, p99, largest, now.speed];
-        numbers.into_iter().chain(now).chain(told).collect()
-    }
-
-    /// Takes up the audit of a checkpoint. A memory of another length is ignored.
-    pub(super) fn take_up(&mut self, memory: &[f64]) {
-        let Ok(
-            [
-                reference,
-                height,
-                least,
-                gained,
-                at_start,
-                work,
-                by_walls,
-                power,
-                x,
-                y,
-                z,
-                excess,
-                volume_at_start,
-                volume_change,
-                mean,
-                p99,
-                largest,
-                max_speed,
-                liveliest,
-                given,
-                allowed,
-                excess_now,
-                volume_now,
-                mean_now,
-                p99_now,
-                largest_now,
-                speed,
-                told @ ..,
-            ],
-        ) = <[f64; 30]>::try_from(memory)
-        else {
-            return;
-        };
-        *self = Self {
-            unjudged: self.unjudged,
-            reference,
-            height,
-            least,
-            given,
-            allowed,
-            gained,
-            is_moved: self.is_moved,
-            is_rough: self.is_rough,
-            at_start,
-            work,
-            by_walls,
-            power,
-            places: DVec3::new(x, y, z),
-            excess,
-            liveliest,
-            volume_at_start,
-            volume_change,
-            compression: Compression { mean, p99, largest },
-            max_speed,
-            now: Instant {
-                excess: excess_now,
-                volume_change: volume_now,
-                compression: Compression { mean: mean_now, p99: p99_now, largest: largest_now },
-                speed,
-            },
-            told: told.map(|told| told != 0.0),
-        };
     }
 }
 

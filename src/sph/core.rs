@@ -402,10 +402,10 @@ impl Core {
         StepError::Stalled { step: self.steps, dt, id, speed }
     }
 
-    /// The error of a state whose energy has doubled.
-    pub fn energy_doubled(&self, excess: f64) -> StepError {
+    /// The error of a state whose energy has doubled, and whether walls moved.
+    pub fn energy_doubled(&self, excess: f64, by_walls: bool) -> StepError {
         let (id, speed) = self.fastest();
-        StepError::EnergyDoubled { step: self.steps, excess, id, speed }
+        StepError::EnergyDoubled { step: self.steps, excess, by_walls, id, speed }
     }
 
     /// Number and speed, m/s, of the fastest particle.

@@ -162,8 +162,11 @@ pub enum StepError {
     EnergyDoubled {
         /// Number of the step.
         step: u64,
-        /// The excess of the energy over that at the start and gravity's work, as a part of that at the start.
+        /// The excess of the energy over that at the start and all work, as a part of that at the start. Where walls
+        /// move, the amounts of what they gave and took belong to it.
         excess: f64,
+        /// Whether walls move.
+        by_walls: bool,
         /// The number, at seeding, of the fastest particle.
         id: u32,
         /// The speed of this particle, m/s.
@@ -197,11 +200,13 @@ impl fmt::Display for StepError {
                      pass over it in one step; end the motion earlier, leave a gap, or make `dt` shorter"
                 );
             }
-            Self::EnergyDoubled { step, excess, id, speed } => {
+            Self::EnergyDoubled { step, excess, by_walls, id, speed } => {
+                let start =
+                    if *by_walls { "that at the start and all that walls gave" } else { "that at the start" };
                 let grown = if *excess < 10.0 {
-                    format!("{:.0} % above that at the start", 100.0 * excess)
+                    format!("{:.0} % above {start}", 100.0 * excess)
                 } else {
-                    format!("{:.0e} times that at the start", 1.0 + excess)
+                    format!("{:.0e} times {start}", 1.0 + excess)
                 };
                 return write!(
                     f,

@@ -1,9 +1,11 @@
 //! The audit against runs whose energy, volume and speeds are known.
 
+use std::sync::Arc;
+
 use super::compression::CLASS;
 use super::*;
 use crate::geom::Aabb;
-use crate::sph::{Dfsph, FluidBlock, Method, Paper, Simulation, Wcsph, scenes};
+use crate::sph::{Dfsph, FluidBlock, Method, Obstacle, Paper, Simulation, Wcsph, scenes};
 
 const TANK: Aabb = Aabb::new(DVec3::ZERO, DVec3::new(1.2, 0.2, 1.4));
 
@@ -105,6 +107,32 @@ fn energy_from_nowhere_is_found_and_stops_a_run() {
     assert!(simulation.news().is_empty(), "told once");
     faster(&mut simulation, 4.0);
     assert!(matches!(simulation.step(), Err(StepError::EnergyDoubled { .. })));
+}
+
+/// A band on a post moves a little of the fluid: what it gives and takes is in the balance, and what exceeds all of it
+/// ends the run as it does where nothing moves.
+#[test]
+fn energy_from_nowhere_stops_a_run_with_moving_walls_too() {
+    let band = || Obstacle {
+        surface_velocity: Some(Arc::new(|_, _| DVec3::new(0.0, 0.0, 0.1))),
+        ..Obstacle::at_rest(scenes::sphere(DVec3::new(0.9, 0.1, 0.1), 0.1), 0.01)
+    };
+    let mut simulation = column(Wcsph::default().into(), 0.1);
+    let mut checkpoint = simulation.checkpoint();
+    let parameters = simulation.parameters().clone();
+    let mut faster = |simulation: &mut Simulation, speed: f64| {
+        let mut column = checkpoint.get("velocity y").unwrap().to_vec();
+        column.iter_mut().for_each(|v| *v += speed);
+        checkpoint.set("velocity y", column);
+        *simulation = Simulation::resume(parameters.clone(), &checkpoint, TANK, vec![band()]).unwrap();
+        (0..10 * LOOK)
+            .map(|_| simulation.step().map(|_| checkpoint = simulation.checkpoint()))
+            .collect::<Result<Vec<_>, _>>()
+    };
+    faster(&mut simulation, 0.5).unwrap();
+    let excess = simulation.audit().energy_excess().unwrap();
+    assert!((0.01..0.1).contains(&excess), "{excess}");
+    assert!(matches!(faster(&mut simulation, 4.0), Err(StepError::EnergyDoubled { by_walls: true, .. })));
 }
 
 #[test]
