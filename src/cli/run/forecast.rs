@@ -61,6 +61,8 @@ struct Forecast {
     milliseconds_per_frame: f64,
     /// Seconds that are spent once: the fluid is placed and settled, walls are mapped, and what rests is drawn.
     seconds_to_start: f64,
+    /// Seconds that the samples of the scene's probes take.
+    seconds_of_probes: f64,
     seconds: f64,
 }
 
@@ -76,6 +78,7 @@ pub(super) fn dry_run(
     goal.lies_ahead(options, &folder::of(options), begin)?;
     let mut trial = Trial::start(shared, experiment, resumed)?;
     let per_step = seconds_per_step(&mut trial.simulation)?;
+    let per_second = seconds_of_probes(trial.coarser.as_ref().unwrap_or(experiment), &mut trial.simulation)?;
     let Trial { ref simulation, particles, .. } = trial;
     let measured = trial.coarser.as_ref().unwrap_or(experiment);
     let (stats, parameters) = (simulation.stats(), experiment.parameters());
@@ -89,12 +92,14 @@ pub(super) fn dry_run(
     let frames = if options.no_frames { 0 } else { first + goal.frames(begin, experiment, time_step) };
     let cost = FrameCost::measured(options, measured, simulation)?.scaled(scale);
     let to_start = scale * trial.to_start + cost.first;
+    let probes = scale * per_second * time_step * steps as f64;
     let disk = frames as f64 * cost.bytes + 2.0 * scale * frames::checkpoint_bytes(simulation);
     let forecast = Forecast {
         schema: 1,
         particles,
         estimated: trial.coarser.is_some() && resumed.is_none(),
-        spacing: parameters.spacing(),
+        // that of the scene is stretched when its particles are placed
+        spacing: trial.coarser.as_ref().map_or(simulation.parameters(), |_| parameters).spacing(),
         neighbours_per_particle: stats.neighbours_per_particle,
         time_step,
         time_step_reason: experiment.time_step().reason,
@@ -110,7 +115,8 @@ pub(super) fn dry_run(
         milliseconds_per_step: per_step * 1e3,
         milliseconds_per_frame: cost.seconds * 1e3,
         seconds_to_start: to_start,
-        seconds: to_start + per_step * steps as f64 + cost.seconds * frames as f64,
+        seconds_of_probes: probes,
+        seconds: to_start + per_step * steps as f64 + cost.seconds * frames as f64 + probes,
     };
     warn_of_too_much(&forecast);
     if shared.json {
@@ -208,6 +214,23 @@ fn seconds_per_step(simulation: &mut Simulation) -> Result<f64, Failure> {
     Ok(started.seconds() / f64::from(trial))
 }
 
+/// The seconds that the samples of the scene's probes take for each second that is simulated. The first sample of a force
+/// finds the pieces of a surface, which later ones know.
+fn seconds_of_probes(measured: &Experiment, simulation: &mut Simulation) -> Result<f64, Failure> {
+    let scene = measured.scene();
+    let mut seconds = 0.0;
+    for probe in &scene.probes {
+        let gauge = simulation.gauge(probe.measured);
+        let mut gauge = gauge.map_err(|e| Failure::usage(format!("probe `{}`: {e}", probe.name)))?;
+        simulation.sample(&mut gauge);
+        let started = Stopwatch::start();
+        simulation.sample(&mut gauge);
+        let every = probe.every.unwrap_or(scene.run.save_every).max(simulation.stable_dt());
+        seconds += started.seconds() / every;
+    }
+    Ok(seconds)
+}
+
 /// The length of a step, s: the fluid will become faster than it is at the start.
 fn time_step(experiment: &Experiment, measured: &Experiment, simulation: &Simulation) -> f64 {
     let parameters = experiment.parameters();
@@ -231,6 +254,9 @@ fn warn_of_too_much(forecast: &Forecast) {
     }
 }
 
+/// Probes that take more than this part of the time are named.
+const SHOWN_PART: f64 = 0.05;
+
 fn print(forecast: &Forecast, parameters: &Parameters) {
     let about = if forecast.estimated { "about " } else { "" };
     let free = |free: Option<f64>| free.map_or(String::new(), |free| format!(", {} free", size(free)));
@@ -251,11 +277,16 @@ fn print(forecast: &Forecast, parameters: &Parameters) {
         free(forecast.disk_bytes_free)
     );
     say!(
-        "time          about {} ({} to start, {} per step, {} per frame)",
+        "time          about {} ({} to start, {} per step, {} per frame{})",
         duration(forecast.seconds),
         short(forecast.seconds_to_start),
         short(1e-3 * forecast.milliseconds_per_step),
-        short(1e-3 * forecast.milliseconds_per_frame)
+        short(1e-3 * forecast.milliseconds_per_frame),
+        if forecast.seconds_of_probes > SHOWN_PART * forecast.seconds {
+            format!(", {} for probes", short(forecast.seconds_of_probes))
+        } else {
+            String::new()
+        }
     );
 }
 

@@ -31,6 +31,8 @@ pub(super) struct Summary {
     particles_carved: usize,
     /// Mass of one particle, kg.
     particle_mass: f64,
+    /// The spacing of the particles at rest, m: the cube root of the volume of one.
+    spacing: f64,
     /// Rest density, kg/m³.
     rest_density: f64,
     milliseconds_per_step: f64,
@@ -113,6 +115,7 @@ impl Summary {
             particles: watch.now.particles,
             particles_carved: watch.carved,
             particle_mass: simulation.parameters().particle_mass,
+            spacing: simulation.parameters().spacing(),
             rest_density: simulation.parameters().rest_density,
             milliseconds_per_step: watch.spent.as_secs_f64() * 1e3 / steps.max(1) as f64,
             neighbours_per_particle: watch.neighbours.0 / watch.neighbours.1 as f64,
@@ -154,8 +157,9 @@ impl Summary {
 /// Prints the summary as text.
 pub(super) fn print(summary: &Summary, frames: &Frames, probes: &Probes) {
     say!(
-        "{} particles, {} steps of {:.3e} s = {:.3} s simulated",
+        "{} particles {:.3e} m apart, {} steps of {:.3e} s = {:.3} s simulated",
         summary.particles,
+        summary.spacing,
         summary.steps,
         summary.time_step,
         summary.simulated_seconds

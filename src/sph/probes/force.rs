@@ -15,7 +15,7 @@
 //! (In the narrow gap between a ball and a bowl this slope is a mean over a curved profile: the torque was 3 % too
 //! small with five spacings from wall to wall, and 9 % with kernels of three spacings.)
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::{BTreeMap, BTreeSet, HashMap};
 
 use glam::DVec3;
 use rayon::prelude::*;
@@ -37,6 +37,9 @@ const BEHIND: f64 = 0.1;
 /// part with a fluid without pressure: the surface of the fluid, and spray.
 const FILLED: f64 = 0.5;
 
+/// The most pieces that are kept, of some 60 bytes each; those of larger surfaces are found each time.
+const MOST_KEPT: usize = 1 << 20;
+
 /// A particle nearer than this part of the support radius counts as that far away for the slope of a velocity.
 const NEAREST: f64 = 0.1;
 
@@ -48,15 +51,29 @@ pub fn about([x, y, z, u, v, w]: [f64; 6], point: DVec3) -> [f64; 6] {
 }
 
 /// Force, N, and torque about a point, N·m, on an obstacle by pressure, and if asked by friction where the fluid
-/// sticks to it. Zero for methods without pressure at walls.
-pub fn on_surface(core: &Core, obstacle: usize, point: DVec3, with_friction: bool) -> [f64; 6] {
+/// sticks to it. Zero for methods without pressure at walls. The pieces of an obstacle at rest are kept for the next
+/// time.
+pub fn on_surface(
+    core: &Core,
+    obstacle: usize,
+    point: DVec3,
+    with_friction: bool,
+    kept: &mut KeptPieces,
+) -> [f64; 6] {
     if !core.parameters.walls_have_density() {
         return [0.0; 6];
     }
     let cells = Cells::of(core);
     let wetted: Vec<[i32; 3]> = cells.wetted().into_iter().collect();
-    let wetting = Wetting { core, cells: &cells, weight: Weight::of(core), obstacle, with_friction };
-    let forces: Vec<(DVec3, DVec3)> = wetted.par_iter().map(|cell| wetting.on_cell(*cell, point)).collect();
+    let all_rest = core.boundary.obstacles.iter().all(|obstacle| obstacle.moving.is_none());
+    let wetting =
+        Wetting { core, cells: &cells, weight: Weight::of(core), obstacle, with_friction, all_rest };
+    kept.add(&wetting, &wetted);
+    let on_cell = |cell: &[i32; 3]| match kept.cells.get(cell) {
+        Some(pieces) => wetting.on_cell(*cell, pieces, point),
+        None => wetting.on_cell(*cell, &wetting.pieces(*cell), point),
+    };
+    let forces: Vec<(DVec3, DVec3)> = wetted.par_iter().map(on_cell).collect();
     // one after the other: the same bits for any number of threads
     let (mut force, mut torque) = (DVec3::ZERO, DVec3::ZERO);
     for (push, turn) in forces {
@@ -64,6 +81,38 @@ pub fn on_surface(core: &Core, obstacle: usize, point: DVec3, with_friction: boo
         torque += turn;
     }
     [force.x, force.y, force.z, torque.x, torque.y, torque.z]
+}
+
+/// The pieces of the surface of an obstacle at rest, by the cells that were wetted so far. To cut them takes as long as
+/// some ten steps.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct KeptPieces {
+    cells: HashMap<[i32; 3], Vec<WallPiece>>,
+    count: usize,
+}
+
+impl KeptPieces {
+    /// Adds the pieces in the cells that are not known yet, unless the obstacle moves.
+    fn add(&mut self, wetting: &Wetting<'_>, wetted: &[[i32; 3]]) {
+        let body = &wetting.core.boundary.obstacles[wetting.obstacle];
+        if body.moving.is_some() || self.count > MOST_KEPT {
+            return;
+        }
+        let new: Vec<[i32; 3]> =
+            wetted.iter().filter(|cell| !self.cells.contains_key(*cell)).copied().collect();
+        let pieces: Vec<Vec<WallPiece>> = new.par_iter().map(|cell| wetting.pieces(*cell)).collect();
+        self.count += pieces.iter().map(Vec::len).sum::<usize>();
+        self.cells.extend(new.into_iter().zip(pieces));
+    }
+}
+
+/// A piece of an obstacle's surface with the walls around it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct WallPiece {
+    piece: Piece,
+    /// The part of a kernel at the piece that walls leave free; zero if another obstacle lies on the piece. `None` if
+    /// it changes, because an obstacle moves.
+    free: Option<f64>,
 }
 
 /// The box in cells that are not smaller than the support radius, with the particles in each.
@@ -116,6 +165,44 @@ struct Wetting<'a> {
     weight: Weight,
     obstacle: usize,
     with_friction: bool,
+    /// Whether no obstacle moves.
+    all_rest: bool,
+}
+
+/// What is used of a particle near a wall.
+#[derive(Clone, Copy)]
+struct NearParticle {
+    i: usize,
+    at: DVec3,
+    volume: f64,
+    pressure: f64,
+    density: f64,
+    /// Its acceleration by pressure, m/s².
+    by_pressure: DVec3,
+}
+
+/// The particles near a cell, and the squares of their distances from a piece, m²: most of them are too far away, and
+/// columns tell that of several at once.
+struct Near {
+    columns: [Vec<f64>; 3],
+    squares: Vec<f64>,
+    particles: Vec<NearParticle>,
+}
+
+impl Near {
+    fn of(particles: Vec<NearParticle>) -> Self {
+        let column = |axis: usize| particles.iter().map(|particle| particle.at[axis]).collect();
+        Self { columns: [column(0), column(1), column(2)], squares: vec![0.0; particles.len()], particles }
+    }
+
+    /// Finds the squares of the distances from a place.
+    fn measure(&mut self, from: DVec3) {
+        let [x, y, z] = &self.columns;
+        for (square, ((x, y), z)) in self.squares.iter_mut().zip(x.iter().zip(y).zip(z)) {
+            let (x, y, z) = (x - from.x, y - from.y, z - from.z);
+            *square = x * x + y * y + z * z;
+        }
+    }
 }
 
 /// What the fluid in front of a piece does to it.
@@ -130,67 +217,95 @@ struct InFront {
 }
 
 impl Wetting<'_> {
-    /// Force and torque on the surface in a cell.
-    fn on_cell(&self, cell: [i32; 3], point: DVec3) -> (DVec3, DVec3) {
+    /// The pieces of the surface in a cell.
+    fn pieces(&self, cell: [i32; 3]) -> Vec<WallPiece> {
         let spacing = self.core.parameters.spacing();
         let field = self.core.boundary.field(self.obstacle);
         let mut pieces = Pieces { field, spacing, found: Vec::new() };
         pieces.find(self.cells.bounds(cell));
-        let near: Vec<usize> = self
+        let with_walls =
+            |piece: Piece| WallPiece { piece, free: self.all_rest.then(|| self.free_part(&piece)) };
+        pieces.found.into_iter().map(with_walls).collect()
+    }
+
+    /// Force and torque on the pieces in a cell.
+    fn on_cell(&self, cell: [i32; 3], pieces: &[WallPiece], point: DVec3) -> (DVec3, DVec3) {
+        if pieces.is_empty() {
+            return (DVec3::ZERO, DVec3::ZERO);
+        }
+        let h = self.core.parameters.support_radius;
+        let reach = pieces.iter().fold(Aabb::EMPTY, |all, wall| all.including(wall.piece.at)).grown(h);
+        let particles: Vec<NearParticle> = self
             .cells
             .around(cell)
             .filter_map(|cell| self.cells.particles.get(&cell))
-            .flat_map(|particles| particles.iter().copied())
+            .flatten()
+            .filter(|&&i| reach.contains(self.core.particles.position.get(i)))
+            .map(|&i| self.near_particle(i))
             .collect();
+        let mut near = Near::of(particles);
         let (mut force, mut torque) = (DVec3::ZERO, DVec3::ZERO);
-        for piece in &pieces.found {
-            let push = self.on_piece(piece, &near);
+        for wall in pieces {
+            let push = self.on_piece(wall, &mut near);
             force += push;
-            torque += (piece.at - point).cross(push);
+            torque += (wall.piece.at - point).cross(push);
         }
         (force, torque)
     }
 
-    fn on_piece(&self, piece: &Piece, near: &[usize]) -> DVec3 {
+    fn near_particle(&self, i: usize) -> NearParticle {
+        let Core { parameters, particles, contacts, acceleration, .. } = self.core;
+        let (density, pressure) = (particles.density[i], particles.pressure[i]);
+        let drag = contacts.as_ref().map_or(DVec3::ZERO, |contacts| contacts.drag(i));
+        let by_pressure = acceleration.get(i) - self.core.gravity(i) - drag;
+        let volume = parameters.particle_mass / density;
+        NearParticle { i, at: particles.position.get(i), volume, pressure, density, by_pressure }
+    }
+
+    fn on_piece(&self, WallPiece { piece, free }: &WallPiece, near: &mut Near) -> DVec3 {
         let Some(normal) = piece.area.try_normalize() else { return DVec3::ZERO };
-        let found = self.in_front(piece, normal, near);
-        if found.filled == 0.0 || self.is_covered(piece, normal) {
+        if *free == Some(0.0) {
             return DVec3::ZERO;
         }
-        let covered =
-            self.core.boundary.coverage::<(), ()>(self.core.wall(), piece.at).map_or(0.0, |c| c.part);
-        let filled = found.filled.max(FILLED * (1.0 - covered.min(MOST_COVERED)));
+        let found = self.in_front(piece, normal, near);
+        if found.filled == 0.0 {
+            return DVec3::ZERO;
+        }
+        let free = free.unwrap_or_else(|| self.free_part(piece));
+        if free == 0.0 {
+            return DVec3::ZERO;
+        }
+        let filled = found.filled.max(FILLED * free);
         let viscosity = self.core.parameters.viscosity;
         (-found.pressure * piece.area + viscosity * piece.area.length() * found.shear) / filled
     }
 
-    fn in_front(&self, piece: &Piece, normal: DVec3, near: &[usize]) -> InFront {
+    fn in_front(&self, piece: &Piece, normal: DVec3, near: &mut Near) -> InFront {
         let Core { parameters, particles, .. } = self.core;
-        let (h, mass) = (parameters.support_radius, parameters.particle_mass);
+        let h = parameters.support_radius;
         let behind = BEHIND * parameters.spacing();
         let body = &self.core.boundary.obstacles[self.obstacle];
         let sticks = self.with_friction && body.slip == Slip::No && parameters.viscosity > 0.0;
-        let contacts = self.core.contacts.as_ref();
         let mut found = InFront::default();
-        for &i in near {
-            let x = particles.position.get(i);
-            let away = x - piece.at;
-            let (r2, distance) = (away.length_squared(), away.dot(normal));
-            if r2 >= h * h || distance < -behind {
+        near.measure(piece.at);
+        for (r2, particle) in near.squares.iter().zip(&near.particles) {
+            if *r2 >= h * h {
                 continue;
             }
-            let density = particles.density[i];
-            let weight = mass / density * self.weight.at(r2);
-            let pressure = particles.pressure[i];
+            let &NearParticle { i, at, volume, pressure, density, by_pressure } = particle;
+            let away = at - piece.at;
+            let (r2, distance) = (away.length_squared(), away.dot(normal));
+            if distance < -behind {
+                continue;
+            }
+            let weight = volume * self.weight.at(r2);
             // a method that solves for its pressure knows none before the first step
             let is_known = self.core.steps > 0 || pressure != 0.0;
-            let drag = contacts.map_or(DVec3::ZERO, |contacts| contacts.drag(i));
-            let by_pressure = self.core.acceleration.get(i) - self.core.gravity(i) - drag;
             found.filled += weight;
             found.pressure +=
                 weight * if is_known { pressure + density * by_pressure.dot(away) } else { 0.0 };
             if sticks {
-                let wall = self.core.boundary.velocity_along(self.obstacle, x);
+                let wall = self.core.boundary.velocity_along(self.obstacle, at);
                 let velocity = particles.velocity.get(i) - wall;
                 let along = velocity - velocity.dot(normal) * normal;
                 found.shear += weight / distance.max(NEAREST * h) * along;
@@ -199,10 +314,15 @@ impl Wetting<'_> {
         found
     }
 
-    /// Whether another obstacle lies on the piece.
-    fn is_covered(&self, piece: &Piece, normal: DVec3) -> bool {
-        let front = piece.at + 0.01 * self.core.parameters.spacing() * normal;
-        let boundary = &self.core.boundary;
-        (0..boundary.obstacles.len()).any(|k| k != self.obstacle && boundary.field(k).omega(front) >= 0.0)
+    /// The part of a kernel at a piece that walls leave free; zero if another obstacle lies on the piece.
+    fn free_part(&self, piece: &Piece) -> f64 {
+        let Core { parameters, boundary, .. } = self.core;
+        let front = piece.at + 0.01 * parameters.spacing() * piece.area.normalize_or_zero();
+        let lies_on_it = |k: usize| k != self.obstacle && boundary.field(k).omega(front) >= 0.0;
+        if (0..boundary.obstacles.len()).any(lies_on_it) {
+            return 0.0;
+        }
+        let covered = boundary.coverage::<(), ()>(self.core.wall(), piece.at).map_or(0.0, |c| c.part);
+        1.0 - covered.min(MOST_COVERED)
     }
 }

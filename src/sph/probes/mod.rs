@@ -13,6 +13,7 @@ mod surface;
 
 use glam::{DMat3, DVec3};
 
+use self::force::KeptPieces;
 use crate::geom::Aabb;
 
 use super::{
@@ -123,12 +124,14 @@ pub struct Gauge {
     pub probe: Probe,
     /// Time of the last sample, and impulse and moment of impulse of the obstacle's contacts up to then.
     last: [f64; 7],
+    /// What is known of the obstacle's surface.
+    pieces: KeptPieces,
 }
 
 impl Gauge {
     /// A probe that has not been sampled yet.
     pub fn new(probe: Probe) -> Self {
-        Self { probe, last: [0.0; 7] }
+        Self { probe, last: [0.0; 7], pieces: KeptPieces::default() }
     }
 
     /// What the probe remembers between two samples, for a checkpoint.
@@ -138,7 +141,7 @@ impl Gauge {
 
     /// A probe with the memory of an earlier one; `None` if the memory has the wrong length.
     pub(super) fn remembering(probe: Probe, memory: &[f64]) -> Option<Self> {
-        memory.try_into().ok().map(|last| Self { probe, last })
+        memory.try_into().ok().map(|last| Self { last, ..Self::new(probe) })
     }
 
     /// A probe whose first sample begins now.
@@ -148,7 +151,7 @@ impl Gauge {
             last[0] = core.time;
             last[1..].copy_from_slice(&contacts.total(obstacle));
         }
-        Self { probe, last }
+        Self { last, ..Self::new(probe) }
     }
 
     pub(super) fn sample(&mut self, core: &Core, audit: &Audit) -> Vec<f64> {
@@ -172,7 +175,7 @@ impl Gauge {
                 let mut force = if is_noted && is_complete {
                     [0.0; 6]
                 } else {
-                    force::on_surface(core, obstacle, about, !is_noted)
+                    force::on_surface(core, obstacle, about, !is_noted, &mut self.pieces)
                 };
                 if is_noted {
                     let impulse = force::about(std::array::from_fn(|k| total[k] - self.last[1 + k]), about);

@@ -20,7 +20,7 @@ const FINENESS: f64 = 1.0 / 3.0;
 const DEEPER: u32 = 3;
 
 /// A piece of a surface.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Piece {
     /// Its middle, m.
     pub at: DVec3,

@@ -232,7 +232,7 @@ fn a_block_carries_the_water_on_it() {
         core.particles.pressure = heights.iter().map(|z| RHO * G * (0.2 + DEPTH - z)).collect();
         core.acceleration.components_mut().into_iter().for_each(|column| column.fill(0.0));
         let [x, y, z, torque_x, torque_y, torque_z] =
-            force::on_surface(&core, 0, DVec3::new(WIDTH, 0.0, 0.0), true);
+            force::on_surface(&core, 0, DVec3::new(WIDTH, 0.0, 0.0), true, &mut KeptPieces::default());
         // the sum over the lattice's layers stands for an integral; `dfsph` has moved the first of them away from
         // the wall, by a hundredth of the spacing
         assert!((z / weight + 1.0).abs() < 0.015, "{z} {weight}");
@@ -256,9 +256,13 @@ fn a_shear_drags_a_block_that_it_sticks_to() {
     for i in 0..core.particles.len() {
         core.particles.velocity.x[i] = rate * (core.particles.position.z[i] - 0.2);
     }
-    assert_eq!(force::on_surface(&core, 0, DVec3::ZERO, true)[0], 0.0, "it slips");
+    assert_eq!(
+        force::on_surface(&core, 0, DVec3::ZERO, true, &mut KeptPieces::default())[0],
+        0.0,
+        "it slips"
+    );
     core.boundary.obstacles[0].slip = crate::sph::Slip::No;
-    let [x, y, z, ..] = force::on_surface(&core, 0, DVec3::ZERO, true);
+    let [x, y, z, ..] = force::on_surface(&core, 0, DVec3::ZERO, true, &mut KeptPieces::default());
     let exact = viscosity * rate * WIDTH * WIDTH;
     assert!((x / exact - 1.0).abs() < 0.01 && y == 0.0 && z.abs() < 1e-9, "{x} {exact} {y} {z}");
 }
