@@ -94,6 +94,18 @@ fn turned_half_spaces_are_solved_together() {
     );
 }
 
+/// A wedge between two sides of an outline ends at either side of the notch opposite, so that no end is found unless
+/// each of them is looked at alone.
+#[test]
+fn twisted_outlines_with_notches_have_ends() {
+    let end = (2.0 * std::f64::consts::PI * 0.7 * 0.1_f64).sin();
+    let dart = "polygon([[1, 0], [0.2, 0.2], [0, 1], [-0.2, -0.2]]).extrude(-0.1, 0.1).twist(0.7)";
+    check(dart, [-end, -end, -0.1], [1.0, 1.0, 0.1], 1e-3);
+    let star =
+        "polygon([[1, 0], [0.3, 0.2], [0, 1], [-0.2, 0.3], [-1, 0], [-0.3, -0.2], [0, -1], [0.2, -0.3]])";
+    check(&format!("{star}.extrude(-0.1, 0.1).twist(0.7)"), [-1.0, -1.0, -0.1], [1.0, 1.0, 0.1], 1e-3);
+}
+
 #[test]
 fn curves_and_blends_have_their_own_extent() {
     // a trefoil knot as the torus of two strands of radius 0.2 around 2 + cos 1.5θ, sin 1.5θ

@@ -12,7 +12,7 @@ use crate::ir::bounds::range::Region;
 use crate::ir::derived::sign::SignRule;
 use crate::ir::graph::{Expr, Graph, Node};
 use crate::ir::interpreter::Interpreter;
-use crate::ir::op::Binary;
+use crate::ir::op::{Binary, Unary};
 
 /// Half the side of the cube that is searched.
 const FARTHEST: f64 = 1e60;
@@ -35,8 +35,7 @@ pub fn reach(graph: &Graph, root: Node) -> Option<Aabb> {
     }
     let mut junctions = Junctions { graph: &graph, known: FxHashMap::default() };
     let found = junctions.above(root, false, 0.0);
-    let ends = found.min.abs().max(found.max.abs()).max_element();
-    (!found.is_empty() && ends < OF_USE).then_some(found)
+    (!found.is_empty() && has_ends(&found)).then_some(found)
 }
 
 /// Whether it is proven that a root is positive at no point and no time. Formulas that would take long are not
@@ -109,6 +108,22 @@ struct Junctions<'g> {
     known: FxHashMap<(Node, bool, u64), Aabb>,
 }
 
+/// A node that is to be above −depth, negated or not.
+#[derive(Clone, Copy)]
+struct Term {
+    node: Node,
+    negated: bool,
+    depth: f64,
+}
+
+/// Whether a box ends on all sides.
+fn has_ends(found: &Aabb) -> bool {
+    found.min.abs().max(found.max.abs()).max_element() < OF_USE
+}
+
+/// The most choices of parts that are looked at one by one.
+const MOST_CHOICES: usize = 64;
+
 /// If u ∨ v > −c, one of u and v is above −c times this, because u ∨ v is at most (2 − √2)·max(u, v) where
 /// both are negative.
 const SHARE: f64 = 1.71;
@@ -123,7 +138,12 @@ impl Junctions<'_> {
         let found = match (SignRule::of(self.graph, node), negated) {
             (SignRule::All(u, v), false) | (SignRule::Any(u, v), true) => {
                 let both = self.above(u, negated, depth).intersection(&self.above(v, negated, depth));
-                self.contracted(node, negated, depth, both)
+                let found = self.contracted(node, negated, depth, both);
+                if has_ends(&found) {
+                    found
+                } else {
+                    found.intersection(&self.by_choices(node, negated, depth))
+                }
             }
             (SignRule::All(u, v), true) | (SignRule::Any(u, v), false) => {
                 let depth = SHARE * depth;
@@ -144,6 +164,60 @@ impl Junctions<'_> {
         };
         self.known.insert(key, found);
         found
+    }
+
+    /// The boxes of all choices of one part of each "any of", together: a wedge that ends at one of two planes has an
+    /// end with each of them, and none with either.
+    fn by_choices(&self, node: Node, negated: bool, depth: f64) -> Aabb {
+        let everywhere = Aabb::new(DVec3::splat(-FARTHEST), DVec3::splat(FARTHEST));
+        let Some(choices) = self.choices(node, negated, depth).filter(|choices| choices.len() > 1) else {
+            return everywhere;
+        };
+        let mut graph = self.graph.clone();
+        let mut hull = Aabb::EMPTY;
+        for terms in choices {
+            let mut all: Option<Node> = None;
+            for Term { node, negated, depth } in terms {
+                let own = if negated { graph.unary(Unary::Neg, node) } else { node };
+                let by = graph.constant(depth);
+                let own = graph.binary(Binary::Add, own, by);
+                all = Some(all.map_or(own, |all| graph.binary(Binary::And, all, own)));
+            }
+            let Some(all) = all else { return everywhere };
+            hull = hull.union(
+                &Junctions { graph: &graph, known: FxHashMap::default() }
+                    .contracted(all, false, 0.0, everywhere),
+            );
+        }
+        hull
+    }
+
+    /// The choices of one part of each "any of" under a node: the terms that are above minus their depths together.
+    /// `None` if there are too many.
+    fn choices(&self, node: Node, negated: bool, depth: f64) -> Option<Vec<Vec<Term>>> {
+        let alone = || Some(vec![vec![Term { node, negated, depth }]]);
+        match (SignRule::of(self.graph, node), negated) {
+            (SignRule::All(u, v), false) | (SignRule::Any(u, v), true) => {
+                let (first, second) = (self.choices(u, negated, depth)?, self.choices(v, negated, depth)?);
+                let with = |a: &Vec<Term>| second.iter().map(|b| [&a[..], b].concat()).collect::<Vec<_>>();
+                let few = first.len() * second.len() <= MOST_CHOICES;
+                few.then(|| first.iter().flat_map(with).collect())
+            }
+            (SignRule::All(u, v), true) | (SignRule::Any(u, v), false) => {
+                let depth = SHARE * depth;
+                let mut all = self.choices(u, negated, depth)?;
+                all.extend(self.choices(v, negated, depth)?);
+                (all.len() <= MOST_CHOICES).then_some(all)
+            }
+            (SignRule::Not(u), _) => self.choices(u, !negated, depth),
+            (SignRule::Same(u), _) if depth == 0.0 => self.choices(u, negated, depth),
+            (SignRule::Same(_) | SignRule::Leaf, _) => match self.shifted(node) {
+                Some((of, by)) => {
+                    self.choices(of, negated, (depth + if negated { -by } else { by }).max(0.0))
+                }
+                None => alone(),
+            },
+        }
     }
 
     /// A node that is the sum of another node and a number.
