@@ -1,5 +1,6 @@
 //! The divergence-free method: its numbers, keys and limits. The scheme is in [`scheme`].
 
+mod ahead;
 mod passes;
 mod rigid;
 mod scheme;
@@ -147,6 +148,10 @@ impl Declaration for Dfsph {
         "specific pressure",
         "debt",
         "own pressure",
+        "pressure ahead",
+        "gravity ahead x",
+        "gravity ahead y",
+        "gravity ahead z",
         "stiffness",
         "last step",
         "crowding x",

@@ -5,10 +5,13 @@
 //! v ← v + dt·(g + viscosity)
 //! v ← v + dt·a(s)          s ≥ 0 so that dρ/dt ≤ −D/τ, or ≤ (ρ₀ − ρ)/τ where ρ < ρ₀
 //! D ← D + dt·(the part of dρ/dt that the solver left)
+//! v ← v + ½·dt·(a(s̄) + the gravity that it bears)    (the next step first takes that gravity back)
 //! x ← x + dt·v + b(s′)     s′ ≥ 0 so that ρ ≤ ρ₀ at the new place
 //! ```
 //!
-//! with s = p/ρ². In the paper the second solver corrects the density by changing velocities, so each small
+//! with a pressure s̄ that has lasted ([`Ahead`]): the fluid follows its curved paths to second order.
+//!
+//! Here s = p/ρ². In the paper the second solver corrects the density by changing velocities, so each small
 //! error of a density becomes a speed: a fluid at rest simmers, and so does its pressure. Here the second
 //! solver changes places, and the displacement is not part of the velocity.
 //!
@@ -66,6 +69,7 @@ use super::super::{
     shifting::{depth, restore_crowding, save_crowding, shift},
     tension::Tension,
 };
+use super::ahead::Ahead;
 use super::passes::{Constants, Continuation, Densities, Drag, Field};
 use super::rigid::Rigid;
 use super::solver::{Begin, Errors, Goal, RateOf, Solver};
@@ -126,6 +130,8 @@ pub struct DivergenceFree {
     pub(super) debt: Vec<f64>,
     /// The pressure that each particle bears, Pa, averaged over the relaxation time.
     pub(super) own_pressure: Vec<f64>,
+    /// What the last step gave of pressure in advance.
+    ahead: Ahead,
     /// Stiffness of a lattice of these particles, see [`Wendland::lattice_stiffness`].
     stiffness: f64,
     /// G = −⅓ Σ V r·∇W + ⅓ tr K of each particle.
@@ -142,7 +148,7 @@ pub struct DivergenceFree {
     /// Displacements of this step that are not part of the velocity, m.
     pub(super) displacement: Vectors,
     /// Velocities including the drift by shifting, m/s.
-    drift: Vectors,
+    pub(super) drift: Vectors,
     /// Densities with the barriers of the walls and the part missing before a free surface, kg/m³. They must
     /// not exceed the rest density.
     pub(super) loaded: Vec<f64>,
@@ -172,6 +178,7 @@ impl Scheme for DivergenceFree {
         // along walls
         self.whole = Rigid::of(&core.particles.position, &core.particles.velocity);
         self.find_other_accelerations(core, dt);
+        self.ahead.take_back_gravity(core, dt);
         add_scaled(&mut core.particles.velocity, &core.acceleration, dt);
         self.keep_density(core, dt);
         self.find_displacements(core, dt, OWED);
@@ -188,6 +195,7 @@ impl Scheme for DivergenceFree {
         checkpoint.set("specific pressure", self.forces.s.clone());
         checkpoint.set("debt", self.debt.clone());
         checkpoint.set("own pressure", self.own_pressure.clone());
+        self.ahead.save(checkpoint);
         checkpoint.set("stiffness", vec![self.forces.stiffness, self.places.stiffness]);
         checkpoint.set(LAST_STEP, vec![self.last_dt]);
         save_crowding(&self.crowding, checkpoint);
@@ -198,6 +206,7 @@ impl Scheme for DivergenceFree {
         self.forces.s = checkpoint.of_particles("specific pressure")?;
         self.debt = checkpoint.of_particles("debt")?;
         self.own_pressure = checkpoint.of_particles("own pressure")?;
+        self.ahead.restore(checkpoint)?;
         if let [forces, places] = checkpoint.get("stiffness")? {
             (self.forces.stiffness, self.places.stiffness) = (*forces, *places);
         }
@@ -223,6 +232,7 @@ impl Scheme for DivergenceFree {
             + self.tension.bytes()
             + self.roughness.bytes()
             + self.walls.bytes()
+            + self.ahead.bytes()
     }
 
     fn iterations(&self) -> Option<u32> {
@@ -252,6 +262,7 @@ impl DivergenceFree {
             places: Solver::new(Continuation::Barrier, &core.parameters, n),
             debt: vec![0.0; n],
             own_pressure: vec![0.0; n],
+            ahead: Ahead::nothing(n),
             stiffness: 0.0,
             spread: vec![0.0; n],
             crowding: Vectors::default(),
@@ -297,7 +308,8 @@ impl DivergenceFree {
     /// Finds the order, walls, densities and factors for the present positions.
     pub(super) fn settle(&mut self, core: &mut Core, kept: &mut [&mut Vec<f64>]) {
         let mut columns: SmallVec<[&mut Vec<f64>; 8]> =
-            smallvec![&mut self.forces.s, &mut self.debt, &mut self.own_pressure];
+            smallvec![&mut self.forces.s, &mut self.debt, &mut self.own_pressure, &mut self.ahead.s];
+        columns.extend(self.ahead.lent.components_mut());
         columns.extend(self.roughness.columns());
         columns.extend(kept.iter_mut().map(|column| &mut **column));
         core.sort(&mut columns);
@@ -397,7 +409,7 @@ impl DivergenceFree {
         }
         self.iterations = self.forces.solve(core, &self.walls, &self.free, dt, goal, Begin::Last);
         if let Some(reaction) = Reaction::of(core, dt) {
-            self.forces.note_walls(reaction, &self.walls, rest);
+            self.forces.note_walls(reaction, &self.walls, rest, (&self.forces.push, &self.forces.s));
         }
         for ((free, rate), debt) in self.free.iter().zip(&self.forces.rate).zip(&mut self.debt) {
             let left = free + dt * rate;
@@ -405,29 +417,55 @@ impl DivergenceFree {
         }
         add_scaled(&mut core.particles.velocity, &self.forces.push, dt);
         add_scaled(&mut core.acceleration, &self.forces.push, 1.0);
+        self.bear(core, dt, relaxation);
+        // what is given in advance keeps densities to second order, of which a rate of density knows nothing
+        self.drift.clone_from(&core.particles.velocity);
+        self.ahead.give(core, (&self.forces, &self.walls), dt);
+        add_scaled(&mut core.acceleration, &self.ahead.push, 0.5);
         self.report_pressure(core, dt, relaxation);
     }
 
-    /// Averages the pressures over the relaxation time, and the reported ones over at most the time in which
-    /// a particle moves by a spacing.
-    fn report_pressure(&mut self, core: &mut Core, dt: f64, relaxation: f64) {
+    /// Finds the pressures that the particles bear in this step and, averaged over the relaxation time, in several.
+    /// The lower of the two is given in advance.
+    fn bear(&mut self, core: &Core, dt: f64, relaxation: f64) {
         let (s, density) = (&self.forces.s, &core.particles.density);
+        let scale = |(rho, g): (&f64, &f64)| (1.0 + depth(*g) * (g - 1.0)) * rho * rho;
+        let scales: Vec<f64> = density.iter().zip(&self.spread).map(scale).collect();
         self.free.clear();
+        // half of the pressure was given in advance
         self.free.extend(
-            s.iter()
-                .zip(density)
-                .zip(&self.spread)
-                .map(|((s, rho), g)| (1.0 + depth(*g) * (g - 1.0)) * s * *rho * *rho),
+            s.iter().zip(&self.ahead.s).zip(&scales).map(|((s, ahead), scale)| (s + 0.5 * ahead) * scale),
         );
-        let Constants { kernel, rest_density, .. } = Constants::of(&core.parameters);
-        self.field.resize(self.free.len(), 0.0);
-        let pass = Field { kernel, rest_density, push: &self.forces.push };
-        core.sum(&pass, [&self.free], [&mut self.field]);
-        // until the relaxation time has passed, the mean is taken since the start
-        let share = (dt / relaxation.min(core.time + dt)).min(1.0);
+        let share = mean_share(core, dt, relaxation);
         for (mean, now) in self.own_pressure.iter_mut().zip(&self.free) {
             *mean += share * (now - *mean);
         }
+        for ((((ahead, s), mean), now), scale) in self
+            .ahead
+            .s
+            .iter_mut()
+            .zip(&mut self.forces.s)
+            .zip(&self.own_pressure)
+            .zip(&self.free)
+            .zip(&scales)
+        {
+            let all = *s + 0.5 * *ahead;
+            *ahead = if *scale > 0.0 { mean.min(*now) / scale } else { 0.0 };
+            // the next solve begins with what is left to find
+            *s = (all - 0.5 * *ahead).max(0.0);
+        }
+    }
+
+    /// Finds the pressures around the particles, and averages the reported ones over at most the time in which a
+    /// particle moves by a spacing.
+    fn report_pressure(&mut self, core: &mut Core, dt: f64, relaxation: f64) {
+        let Constants { kernel, rest_density, .. } = Constants::of(&core.parameters);
+        self.field.resize(self.free.len(), 0.0);
+        self.displacement.clone_from(&self.forces.push);
+        add_scaled(&mut self.displacement, &self.ahead.push, 0.5);
+        let pass = Field { kernel, rest_density, push: &self.displacement };
+        core.sum(&pass, [&self.free], [&mut self.field]);
+        let share = mean_share(core, dt, relaxation);
         let spacing = core.parameters.spacing();
         let Particles { position, velocity, pressure, .. } = &mut core.particles;
         for (i, (mean, now)) in pressure.iter_mut().zip(&self.field).enumerate() {
@@ -439,9 +477,8 @@ impl DivergenceFree {
 
     /// Finds the displacements of a step of the length dt: those by shifting, and those that keep densities
     /// at the new places from exceeding the rest density. The part `owed` of the density that the latter take
-    /// away becomes a debt.
+    /// away becomes a debt. The velocities are those in `drift`.
     pub(super) fn find_displacements(&mut self, core: &Core, dt: f64, owed: f64) {
-        self.drift.clone_from(&core.particles.velocity);
         if let Some((crowding, factor)) = shift(self.numbers.shifting, &self.crowding, core) {
             add_scaled(&mut self.drift, crowding, factor);
         }
@@ -479,6 +516,12 @@ fn square_of_norm(matrix: &DMat3) -> f64 {
     let eighth = fourth * fourth;
     let entries = eighth.to_cols_array();
     entries.iter().map(|x| x * x).sum::<f64>().sqrt().powf(0.25)
+}
+
+/// The weight of a step's pressure in a mean over the relaxation time. Until that has passed, the mean is taken since
+/// the start.
+fn mean_share(core: &Core, dt: f64, relaxation: f64) -> f64 {
+    (dt / relaxation.min(core.time + dt)).min(1.0)
 }
 
 /// The time, s, in which a debt is paid back after a step of the length `dt` with the greatest speed `speed`.

@@ -227,14 +227,17 @@ impl Solver {
 
     /// Finds a(s).
     fn find_push(&mut self, core: &Core, walls: &Walls) {
-        let pass = Push {
-            constants: Constants::of(&core.parameters),
-            walls,
-            pressure: &self.s,
-            continuation: self.continuation,
-        };
-        let Vectors { x, y, z } = &mut self.push;
-        core.sum(&pass, [&self.s], [&mut x[..], y, z]);
+        let mut push = std::mem::take(&mut self.push);
+        self.find_push_of(core, walls, &self.s, &mut push);
+        self.push = push;
+    }
+
+    /// Finds the a(s) of other pressures than the answer.
+    pub fn find_push_of(&self, core: &Core, walls: &Walls, s: &[f64], push: &mut Vectors) {
+        let (constants, continuation) = (Constants::of(&core.parameters), self.continuation);
+        let pass = Push { constants, walls, pressure: s, continuation };
+        let Vectors { x, y, z } = push;
+        core.sum(&pass, [s], [&mut x[..], y, z]);
     }
 
     /// Finds the dρ/dt of velocities, or of accelerations in a second.
@@ -265,10 +268,16 @@ impl Solver {
 
     /// Notes the part of the walls in a(s) = M·(a of the pairs − 2ρ₀s·∇λ), for the system that changes
     /// velocities. The rest density is in kg/m³.
-    pub fn note_walls(&self, reaction: Reaction<'_>, walls: &Walls, rest_density: f64) {
+    pub fn note_walls(
+        &self,
+        reaction: Reaction<'_>,
+        walls: &Walls,
+        rest_density: f64,
+        (push, s): (&Vectors, &[f64]),
+    ) {
         walls.found().par_iter().with_min_len(CHUNK / 4).for_each(|(i, wall, completion)| {
             let i = *i as usize;
-            let (push, factor) = (self.push.get(i), -2.0 * rest_density * self.s[i]);
+            let (push, factor) = (push.get(i), -2.0 * rest_density * s[i]);
             let of_pairs = completion.inverse() * push - factor * wall.gradient;
             let by_pressure = push - of_pairs;
             let pushed = Pushed { by_pressure, factor, gradient: wall.gradient, ..Pushed::default() };

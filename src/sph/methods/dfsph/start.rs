@@ -153,6 +153,7 @@ impl DivergenceFree {
             // the density that later rounds take away was added by earlier ones, so it is not owed
             let owed = if round == 0 { OWED } else { 0.0 };
             // before the first step moving walls do not sweep
+            self.drift.clone_from(&core.particles.velocity);
             self.find_displacements(core, 0.0, owed);
             let moves = self.displacement.iter().any(|way| way != DVec3::ZERO);
             if moves && !self.displace(core, 1.0, velocity) {
