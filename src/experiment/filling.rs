@@ -441,6 +441,7 @@ impl Experiment {
         let all = lost + carved.kept;
         let part = match 100.0 * lost as f64 / all as f64 {
             percent if percent < 1.0 => "less than 1 %".to_string(),
+            percent if percent > 99.0 => "more than 99 %".to_string(),
             percent => format!("{percent:.0} %"),
         };
         let mut message = format!(

@@ -225,9 +225,10 @@ impl Experiment {
             }
             SeedError::NothingLeft(carved) => {
                 let message = format!("no particle is left: {}", self.reasons(carved));
-                let help = match self.scene.obstacles.is_empty() {
-                    true => "move the shape of the fluid into the room that it may fill",
-                    false => "move the shape of the fluid out of the obstacles",
+                let is_in_one = !self.scene.obstacles.is_empty() && carved.inside + carved.too_close > 0;
+                let help = match is_in_one {
+                    false => "move the shape of the fluid into the room that it may fill",
+                    true => "move the shape of the fluid out of the obstacles",
                 };
                 Diagnostic::error(Code::OBSTACLE_FILLS_BOX, fluid.shape_span, message).help(help)
             }

@@ -9,7 +9,7 @@ use super::names::{Kind, TIME};
 use crate::diagnostic::{Code, Diagnostic, SourceId, Span};
 use crate::ir::{Binary, Node};
 use crate::quantity::{Dimension, parse_unit};
-use crate::syntax::ast::{Expr, ExprKind, Fold, Logic};
+use crate::syntax::ast::{Expr, ExprKind, Fold, Logic, MulOp};
 use crate::syntax::foreign;
 
 impl Lowering<'_> {
@@ -370,7 +370,10 @@ fn is_factor_of_time(expr: &Expr, number: &Expr) -> bool {
     match &expr.kind {
         ExprKind::Product { first, rest } => {
             let factors = || std::iter::once(&**first).chain(rest.iter().map(|(_, factor)| factor));
-            factors().any(is_time) && factors().any(|factor| without_sign(factor).span == number.span)
+            let multiplied =
+                rest.iter().filter(|(operator, _)| *operator == MulOp::Multiply).map(|(_, factor)| factor);
+            std::iter::once(&**first).chain(multiplied).any(is_time)
+                && factors().any(|factor| without_sign(factor).span == number.span)
                 || factors().any(|factor| is_factor_of_time(factor, number))
         }
         _ => expr.children().into_iter().any(|part| is_factor_of_time(part, number)),

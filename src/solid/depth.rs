@@ -56,8 +56,8 @@ impl Field for Depth<'_> {
 }
 
 impl Solid {
-    /// The cheapest field that has the values of [`Depth`] within `reach` of the surface in a box: [`Depth`] itself
-    /// for a few leaves, and for many a [`CellMap`], which asks only those that matter at a place. It is made for
+    /// A field with the surface of [`Depth`] in a box, and its distances within `reach` of it: [`Depth`] itself
+    /// for a few leaves, and for many a [`CellMap`], which asks only those that have a zero near a place. It is made for
     /// points that lie near the surface; elsewhere it costs as much as [`Depth`].
     pub fn depth(&self, over: Aabb, reach: f64) -> Box<dyn Field + '_> {
         match if self.has_many_leaves() { CellMap::with_reach(self, over, reach) } else { None } {

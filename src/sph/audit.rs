@@ -63,7 +63,7 @@ const RUINOUS_EXCESS: f64 = 1.0;
 
 /// Where walls move, as many looks one after the other must find such an excess: walls that begin to move have given
 /// next to nothing.
-const RUINOUS_LOOKS: f64 = 8.0;
+const RUINOUS_LOOKS: u32 = 8;
 
 /// A change of the volume above this part of it is a finding.
 const MOST_VOLUME_CHANGE: f64 = 0.02;
@@ -100,11 +100,10 @@ pub struct Audit {
     least: f64,
     /// Work of walls since the last look, J.
     given: f64,
-    /// The energy at the start, or what walls must at least give to be judged, and the amounts of what they gave or
-    /// took since, J.
+    /// The reference at the start, and the amounts of the work of walls from look to look, J.
     supplied: f64,
-    /// The number of looks, one after the other, that found more energy from nowhere than that.
-    ruinous_looks: f64,
+    /// The number of looks, one after the other, at which as much energy had come from nowhere.
+    ruinous_looks: u32,
     /// What the errors of roughly known work may have added to the energy since it was least, J.
     allowed: f64,
     /// The mean of what it is so since the last look, J.
@@ -246,7 +245,7 @@ impl Audit {
             least: 0.0,
             given: 0.0,
             supplied: reference,
-            ruinous_looks: 0.0,
+            ruinous_looks: 0,
             allowed: 0.0,
             gained: 0.0,
             is_moved,
@@ -306,7 +305,7 @@ impl Audit {
                 if core.steps.is_multiple_of(LOOK) {
                     let by_nothing = self.look_at_gain(parameters.surface_tension).unwrap_or(0.0);
                     let is_ruinous = by_nothing > RUINOUS_EXCESS;
-                    self.ruinous_looks = if is_ruinous { self.ruinous_looks + 1.0 } else { 0.0 };
+                    self.ruinous_looks = if is_ruinous { self.ruinous_looks + 1 } else { 0 };
                     if self.ruinous_looks >= RUINOUS_LOOKS {
                         return Err(core.energy_doubled(by_nothing, true));
                     }

@@ -403,9 +403,9 @@ impl Core {
     }
 
     /// The error of a state whose energy has doubled, and whether walls moved.
-    pub fn energy_doubled(&self, excess: f64, by_walls: bool) -> StepError {
+    pub fn energy_doubled(&self, excess: f64, walls_move: bool) -> StepError {
         let (id, speed) = self.fastest();
-        StepError::EnergyDoubled { step: self.steps, excess, by_walls, id, speed }
+        StepError::EnergyDoubled { step: self.steps, excess, walls_move, id, speed }
     }
 
     /// Number and speed, m/s, of the fastest particle.

@@ -166,7 +166,7 @@ pub enum StepError {
         /// move, the amounts of what they gave and took belong to it.
         excess: f64,
         /// Whether walls move.
-        by_walls: bool,
+        walls_move: bool,
         /// The number, at seeding, of the fastest particle.
         id: u32,
         /// The speed of this particle, m/s.
@@ -200,9 +200,12 @@ impl fmt::Display for StepError {
                      pass over it in one step; end the motion earlier, leave a gap, or make `dt` shorter"
                 );
             }
-            Self::EnergyDoubled { step, excess, by_walls, id, speed } => {
-                let start =
-                    if *by_walls { "that at the start and all that walls gave" } else { "that at the start" };
+            Self::EnergyDoubled { step, excess, walls_move, id, speed } => {
+                let start = if *walls_move {
+                    "that at the start and all that walls gave and took"
+                } else {
+                    "that at the start"
+                };
                 let grown = if *excess < 10.0 {
                     format!("{:.0} % above {start}", 100.0 * excess)
                 } else {

@@ -18,7 +18,7 @@ use super::goal::{Begin, Goal};
 use super::summary::pass_names;
 use super::{folder, refused, start};
 use rfm::diagnostic::Code;
-use rfm::sph::{Checkpoint, Parameters, Simulation};
+use rfm::sph::{Checkpoint, Gauge, Parameters, Simulation};
 use rfm::{Error, Experiment};
 
 /// Most particles of a simulation that is started to be measured, and least if they have very many neighbours.
@@ -77,8 +77,10 @@ pub(super) fn dry_run(
     let begin = resumed.map_or(Begin::default(), |from| Begin { steps: from.steps, time: from.time });
     goal.lies_ahead(options, &folder::of(options), begin)?;
     let mut trial = Trial::start(shared, experiment, resumed)?;
+    // probes may ask steps to note forces, which takes time
+    let mut probes = TrialProbes::start(trial.coarser.as_ref().unwrap_or(experiment), &mut trial.simulation)?;
     let per_step = seconds_per_step(&mut trial.simulation)?;
-    let per_second = seconds_of_probes(trial.coarser.as_ref().unwrap_or(experiment), &mut trial.simulation)?;
+    let per_second = probes.seconds(&trial.simulation);
     let Trial { ref simulation, particles, .. } = trial;
     let measured = trial.coarser.as_ref().unwrap_or(experiment);
     let (stats, parameters) = (simulation.stats(), experiment.parameters());
@@ -92,7 +94,7 @@ pub(super) fn dry_run(
     let frames = if options.no_frames { 0 } else { first + goal.frames(begin, experiment, time_step) };
     let cost = FrameCost::measured(options, measured, simulation)?.scaled(scale);
     let to_start = scale * trial.to_start + cost.first;
-    let probes = scale * per_second * time_step * steps as f64;
+    let for_probes = scale * per_second * time_step * steps as f64;
     let disk = frames as f64 * cost.bytes + 2.0 * scale * frames::checkpoint_bytes(simulation);
     let forecast = Forecast {
         schema: 1,
@@ -115,8 +117,8 @@ pub(super) fn dry_run(
         milliseconds_per_step: per_step * 1e3,
         milliseconds_per_frame: cost.seconds * 1e3,
         seconds_to_start: to_start,
-        seconds_of_probes: probes,
-        seconds: to_start + per_step * steps as f64 + cost.seconds * frames as f64 + probes,
+        seconds_of_probes: for_probes,
+        seconds: to_start + per_step * steps as f64 + cost.seconds * frames as f64 + for_probes,
     };
     warn_of_too_much(&forecast);
     if shared.json {
@@ -214,21 +216,35 @@ fn seconds_per_step(simulation: &mut Simulation) -> Result<f64, Failure> {
     Ok(started.seconds() / f64::from(trial))
 }
 
-/// The seconds that the samples of the scene's probes take for each second that is simulated. The first sample of a force
-/// finds the pieces of a surface, which later ones know.
-fn seconds_of_probes(measured: &Experiment, simulation: &mut Simulation) -> Result<f64, Failure> {
-    let scene = measured.scene();
-    let mut seconds = 0.0;
-    for probe in &scene.probes {
-        let gauge = simulation.gauge(probe.measured);
-        let mut gauge = gauge.map_err(|e| Failure::usage(format!("probe `{}`: {e}", probe.name)))?;
-        simulation.sample(&mut gauge);
-        let started = Stopwatch::start();
-        simulation.sample(&mut gauge);
-        let every = probe.every.unwrap_or(scene.run.save_every).max(simulation.stable_dt());
-        seconds += started.seconds() / every;
+/// The probes of a scene, sampled once before the steps that are timed.
+struct TrialProbes {
+    /// Each with the time between two samples, s.
+    gauges: Vec<(Gauge, f64)>,
+}
+
+impl TrialProbes {
+    /// Samples each probe once: the first sample of a force finds the pieces of a surface, which later ones know.
+    fn start(measured: &Experiment, simulation: &mut Simulation) -> Result<Self, Failure> {
+        let scene = measured.scene();
+        let mut gauges = Vec::new();
+        for probe in &scene.probes {
+            let gauge = simulation.gauge(probe.measured);
+            let mut gauge = gauge.map_err(|e| Failure::usage(format!("probe `{}`: {e}", probe.name)))?;
+            simulation.sample(&mut gauge);
+            gauges.push((gauge, probe.every.unwrap_or(scene.run.save_every)));
+        }
+        Ok(Self { gauges })
     }
-    Ok(seconds)
+
+    /// The seconds that their samples take for each second that is simulated.
+    fn seconds(&mut self, simulation: &Simulation) -> f64 {
+        let of_one = |(gauge, every): &mut (Gauge, f64)| {
+            let started = Stopwatch::start();
+            simulation.sample(gauge);
+            started.seconds() / every.max(simulation.stable_dt())
+        };
+        self.gauges.iter_mut().map(of_one).sum()
+    }
 }
 
 /// The length of a step, s: the fluid will become faster than it is at the start.

@@ -33,7 +33,7 @@ pub fn reach(graph: &Graph, root: Node) -> Option<Aabb> {
     if graph.len() > MOST_NODES {
         return None;
     }
-    let mut junctions = Junctions { graph: &graph, known: FxHashMap::default() };
+    let mut junctions = Junctions::of(&graph);
     let found = junctions.above(root, false, 0.0);
     (!found.is_empty() && has_ends(&found)).then_some(found)
 }
@@ -48,7 +48,7 @@ pub fn is_nowhere_positive(graph: &Graph, root: Node) -> bool {
     if graph.len() > MOST_NODES {
         return false;
     }
-    let mut junctions = Junctions { graph: &graph, known: FxHashMap::default() };
+    let mut junctions = Junctions::of(&graph);
     let mut waiting = vec![junctions.above(root, false, 0.0)];
     for _ in 0..MOST_BOXES {
         let Some(space) = waiting.pop() else { return true };
@@ -106,6 +106,8 @@ fn folded(graph: &Graph, root: Node) -> (Graph, Node) {
 struct Junctions<'g> {
     graph: &'g Graph,
     known: FxHashMap<(Node, bool, u64), Aabb>,
+    /// How many nodes may still be looked at choice by choice.
+    tries: usize,
 }
 
 /// A node that is to be above −depth, negated or not.
@@ -121,14 +123,22 @@ fn has_ends(found: &Aabb) -> bool {
     found.min.abs().max(found.max.abs()).max_element() < OF_USE
 }
 
-/// The most choices of parts that are looked at one by one.
+/// The most choices of parts that are looked at one by one, their terms, the nodes of all their graphs, and the nodes
+/// whose choices are looked at.
 const MOST_CHOICES: usize = 64;
+const MOST_TERMS: usize = 2000;
+const MOST_NODES_OF_CHOICES: usize = 100_000;
+const MOST_TRIES: usize = 16;
 
 /// If u ∨ v > −c, one of u and v is above −c times this, because u ∨ v is at most (2 − √2)·max(u, v) where
 /// both are negative.
 const SHARE: f64 = 1.71;
 
-impl Junctions<'_> {
+impl<'g> Junctions<'g> {
+    fn of(graph: &'g Graph) -> Self {
+        Self { graph, known: FxHashMap::default(), tries: MOST_TRIES }
+    }
+
     /// A box around the points at which a node, negated or not, is above −`depth`, which is not negative.
     fn above(&mut self, node: Node, negated: bool, depth: f64) -> Aabb {
         let key = (node, negated, depth.to_bits());
@@ -139,7 +149,7 @@ impl Junctions<'_> {
             (SignRule::All(u, v), false) | (SignRule::Any(u, v), true) => {
                 let both = self.above(u, negated, depth).intersection(&self.above(v, negated, depth));
                 let found = self.contracted(node, negated, depth, both);
-                if has_ends(&found) {
+                if found.is_empty() || has_ends(&found) {
                     found
                 } else {
                     found.intersection(&self.by_choices(node, negated, depth))
@@ -168,11 +178,13 @@ impl Junctions<'_> {
 
     /// The boxes of all choices of one part of each "any of", together: a wedge that ends at one of two planes has an
     /// end with each of them, and none with either.
-    fn by_choices(&self, node: Node, negated: bool, depth: f64) -> Aabb {
+    fn by_choices(&mut self, node: Node, negated: bool, depth: f64) -> Aabb {
         let everywhere = Aabb::new(DVec3::splat(-FARTHEST), DVec3::splat(FARTHEST));
-        let Some(choices) = self.choices(node, negated, depth).filter(|choices| choices.len() > 1) else {
-            return everywhere;
-        };
+        let is_short =
+            |choices: &Vec<_>| choices.len() > 1 && choices.len() * self.graph.len() <= MOST_NODES_OF_CHOICES;
+        let choices = (self.tries > 0).then(|| self.choices(node, negated, depth)).flatten();
+        let Some(choices) = choices.filter(is_short) else { return everywhere };
+        self.tries -= 1;
         let mut graph = self.graph.clone();
         let mut hull = Aabb::EMPTY;
         for terms in choices {
@@ -184,10 +196,10 @@ impl Junctions<'_> {
                 all = Some(all.map_or(own, |all| graph.binary(Binary::And, all, own)));
             }
             let Some(all) = all else { return everywhere };
-            hull = hull.union(
-                &Junctions { graph: &graph, known: FxHashMap::default() }
-                    .contracted(all, false, 0.0, everywhere),
-            );
+            hull = hull.union(&Junctions::of(&graph).contracted(all, false, 0.0, everywhere));
+            if hull.size().min_element() > OF_USE {
+                return everywhere;
+            }
         }
         hull
     }
@@ -200,7 +212,9 @@ impl Junctions<'_> {
             (SignRule::All(u, v), false) | (SignRule::Any(u, v), true) => {
                 let (first, second) = (self.choices(u, negated, depth)?, self.choices(v, negated, depth)?);
                 let with = |a: &Vec<Term>| second.iter().map(|b| [&a[..], b].concat()).collect::<Vec<_>>();
-                let few = first.len() * second.len() <= MOST_CHOICES;
+                let terms = |choices: &[Vec<Term>]| choices.iter().map(Vec::len).sum::<usize>();
+                let all = terms(&first) * second.len() + terms(&second) * first.len();
+                let few = first.len() * second.len() <= MOST_CHOICES && all <= MOST_TERMS;
                 few.then(|| first.iter().flat_map(with).collect())
             }
             (SignRule::All(u, v), true) | (SignRule::Any(u, v), false) => {

@@ -102,23 +102,31 @@ impl<'a> Draft<'a> {
 
     /// Moves cuts back where triangles cross, if none crossed without them, and takes care from now on that none do.
     /// For a mesh that was cut and not mended.
-    pub fn part(&mut self) {
+    ///
+    /// # Errors
+    /// [`MeshError::Ended`].
+    pub fn part(&mut self) -> Result<(), MeshError> {
         self.care = Care::Apart;
         let ends = std::mem::take(&mut self.cut_ends);
         if !ends.is_empty() {
-            self.uncross(self.first_cut, &ends);
+            self.uncross(self.first_cut, &ends)?;
         }
+        Ok(())
     }
 
     /// Moves vertices that cut edges back to the middles of their edges where triangles cross, and then
     /// returns as many of them as possible to the surface. The vertices with indices from `first` cut the
     /// edges with the given ends; without them nothing crosses.
-    fn uncross(&mut self, first: usize, ends: &[[u32; 2]]) {
+    ///
+    /// # Errors
+    /// [`MeshError::Ended`].
+    fn uncross(&mut self, first: usize, ends: &[[u32; 2]]) -> Result<(), MeshError> {
         let mut is_back = vec![false; ends.len()];
         let mut suspects = self.doubtful();
         let mut cuts: BTreeMap<u32, Vertex> = BTreeMap::new();
         let place_of = |v: u32| (v as usize).checked_sub(first);
         for round in 1..=UNDOINGS {
+            ended(self.watch)?;
             let pairs = crossing_pairs(&self.vertices.positions, &self.triangles, &suspects, self.size);
             // a vertex in the middle of its edge lies in the plane of the first triangles only if its ends do
             let mut retreating: Vec<usize> = pairs
@@ -160,6 +168,7 @@ impl<'a> Draft<'a> {
             suspects.dedup();
         }
         self.restore(&cuts);
+        Ok(())
     }
 
     /// Moves vertices to where they were, unless a triangle beside them would then cross another: all at once

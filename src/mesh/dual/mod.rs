@@ -158,7 +158,7 @@ impl<'a> Attempt<'a> {
 /// Those of [`Draft::mend`], and [`MeshError::Ended`].
 fn apart(mut draft: Draft<'_>, far: Vec<[u32; 2]>, watch: &dyn Watch) -> Result<Mesh, MeshError> {
     crossings::ended(watch)?;
-    draft.part();
+    draft.part()?;
     crossings::ended(watch)?;
     draft.mend(far)?;
     Ok(draft.finish())

@@ -56,6 +56,7 @@ pub(super) fn secure(
     let mut lasting = cell_vertices;
     let mut round = 0;
     loop {
+        ended(surface.watch)?;
         vertices.truncate(lasting);
         let (triangles, chosen) = assemble(&quads, &cut, vertices, tubes, &suspects);
         let pairs = match round {

@@ -32,7 +32,7 @@ impl Audit {
             self.liveliest,
             self.given,
             self.supplied,
-            self.ruinous_looks,
+            f64::from(self.ruinous_looks),
             self.allowed,
         ];
         let now = self.now;
@@ -87,7 +87,7 @@ impl Audit {
             least,
             given,
             supplied,
-            ruinous_looks,
+            ruinous_looks: ruinous_looks as u32,
             allowed,
             gained,
             is_moved: self.is_moved,

@@ -37,8 +37,10 @@ const BEHIND: f64 = 0.1;
 /// part with a fluid without pressure: the surface of the fluid, and spray.
 const FILLED: f64 = 0.5;
 
-/// The most pieces that are kept, of some 60 bytes each; those of larger surfaces are found each time.
+/// The most cells and pieces that are kept, of some 60 bytes each, and how many cells are added at a time; what a larger
+/// surface has besides is found each time.
 const MOST_KEPT: usize = 1 << 20;
+const CELLS_AT_ONCE: usize = 512;
 
 /// A particle nearer than this part of the support radius counts as that far away for the slope of a velocity.
 const NEAREST: f64 = 0.1;
@@ -88,6 +90,7 @@ pub fn on_surface(
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct KeptPieces {
     cells: HashMap<[i32; 3], Vec<WallPiece>>,
+    /// The number of cells and pieces.
     count: usize,
 }
 
@@ -95,14 +98,19 @@ impl KeptPieces {
     /// Adds the pieces in the cells that are not known yet, unless the obstacle moves.
     fn add(&mut self, wetting: &Wetting<'_>, wetted: &[[i32; 3]]) {
         let body = &wetting.core.boundary.obstacles[wetting.obstacle];
-        if body.moving.is_some() || self.count > MOST_KEPT {
+        if body.moving.is_some() {
             return;
         }
         let new: Vec<[i32; 3]> =
             wetted.iter().filter(|cell| !self.cells.contains_key(*cell)).copied().collect();
-        let pieces: Vec<Vec<WallPiece>> = new.par_iter().map(|cell| wetting.pieces(*cell)).collect();
-        self.count += pieces.iter().map(Vec::len).sum::<usize>();
-        self.cells.extend(new.into_iter().zip(pieces));
+        for some in new.chunks(CELLS_AT_ONCE) {
+            if self.count > MOST_KEPT {
+                break;
+            }
+            let pieces: Vec<Vec<WallPiece>> = some.par_iter().map(|cell| wetting.pieces(*cell)).collect();
+            self.count += pieces.iter().map(|pieces| 1 + pieces.len()).sum::<usize>();
+            self.cells.extend(some.iter().copied().zip(pieces));
+        }
     }
 }
 

@@ -175,7 +175,12 @@ impl Gauge {
                 let mut force = if is_noted && is_complete {
                     [0.0; 6]
                 } else {
-                    force::on_surface(core, obstacle, about, !is_noted, &mut self.pieces)
+                    let found = force::on_surface(core, obstacle, about, !is_noted, &mut self.pieces);
+                    if is_complete {
+                        // later samples are sums of what steps note
+                        self.pieces = KeptPieces::default();
+                    }
+                    found
                 };
                 if is_noted {
                     let impulse = force::about(std::array::from_fn(|k| total[k] - self.last[1 + k]), about);

@@ -2,14 +2,14 @@
 //! are found by iteration.
 //!
 //! ```text
-//! v ← v + dt·(g + viscosity)
+//! v ← v + dt·(½·g + viscosity)
 //! v ← v + dt·a(s)          s ≥ 0 so that dρ/dt ≤ −D/τ, or ≤ (ρ₀ − ρ)/τ where ρ < ρ₀
 //! D ← D + dt·(the part of dρ/dt that the solver left)
-//! v ← v + ½·dt·(a(s̄) + the gravity that it bears)    (the next step first takes that gravity back)
+//! v ← v + ½·dt·(g + a(s̄))
 //! x ← x + dt·v + b(s′)     s′ ≥ 0 so that ρ ≤ ρ₀ at the new place
 //! ```
 //!
-//! with a pressure s̄ that has lasted ([`Ahead`]): the fluid follows its curved paths to second order.
+//! with the lower of the last pressure and its mean as s̄ ([`Ahead`]): the fluid follows its curved paths to second order.
 //!
 //! Here s = p/ρ². In the paper the second solver corrects the density by changing velocities, so each small
 //! error of a density becomes a speed: a fluid at rest simmers, and so does its pressure. Here the second
@@ -178,8 +178,8 @@ impl Scheme for DivergenceFree {
         // along walls
         self.whole = Rigid::of(&core.particles.position, &core.particles.velocity);
         self.find_other_accelerations(core, dt);
-        self.ahead.take_back_gravity(core, dt);
         add_scaled(&mut core.particles.velocity, &core.acceleration, dt);
+        self.ahead.hold_back(core, dt);
         self.keep_density(core, dt);
         self.find_displacements(core, dt, OWED);
         core.move_obstacles(dt);
@@ -309,7 +309,6 @@ impl DivergenceFree {
     pub(super) fn settle(&mut self, core: &mut Core, kept: &mut [&mut Vec<f64>]) {
         let mut columns: SmallVec<[&mut Vec<f64>; 8]> =
             smallvec![&mut self.forces.s, &mut self.debt, &mut self.own_pressure, &mut self.ahead.s];
-        columns.extend(self.ahead.lent.components_mut());
         columns.extend(self.roughness.columns());
         columns.extend(kept.iter_mut().map(|column| &mut **column));
         core.sort(&mut columns);
@@ -376,7 +375,7 @@ impl DivergenceFree {
         // down and falls again: if the force acted for the whole of each step, a ball of water that swings
         // through the middle of a trap would lose a tenth of its energy in three periods. (After uniform
         // gravity velocities are those of the end of a step, whatever its length.)
-        core.pull((0.5 * (self.last_dt + dt) / dt).min(MOST_CARRIED));
+        self.ahead.pull(core, (0.5 * (self.last_dt + dt) / dt).min(MOST_CARRIED));
         self.tension.act(core);
     }
 
@@ -432,10 +431,11 @@ impl DivergenceFree {
         let scale = |(rho, g): (&f64, &f64)| (1.0 + depth(*g) * (g - 1.0)) * rho * rho;
         let scales: Vec<f64> = density.iter().zip(&self.spread).map(scale).collect();
         self.free.clear();
-        // half of the pressure was given in advance
-        self.free.extend(
-            s.iter().zip(&self.ahead.s).zip(&scales).map(|((s, ahead), scale)| (s + 0.5 * ahead) * scale),
-        );
+        // what acted since the last solve, half of the last step and half of this one: the pressure that was given in
+        // advance, and this answer for all of this step
+        let [given, found] = [self.last_dt / (self.last_dt + dt), 2.0 * dt / (self.last_dt + dt)];
+        let now = |((s, ahead), scale): ((&f64, &f64), &f64)| (found * s + given * ahead) * scale;
+        self.free.extend(s.iter().zip(&self.ahead.s).zip(&scales).map(now));
         let share = mean_share(core, dt, relaxation);
         for (mean, now) in self.own_pressure.iter_mut().zip(&self.free) {
             *mean += share * (now - *mean);
@@ -461,9 +461,11 @@ impl DivergenceFree {
     fn report_pressure(&mut self, core: &mut Core, dt: f64, relaxation: f64) {
         let Constants { kernel, rest_density, .. } = Constants::of(&core.parameters);
         self.field.resize(self.free.len(), 0.0);
-        self.displacement.clone_from(&self.forces.push);
-        add_scaled(&mut self.displacement, &self.ahead.push, 0.5);
-        let pass = Field { kernel, rest_density, push: &self.displacement };
+        // the displacements of this step are not known yet
+        let push = &mut self.displacement;
+        push.clone_from(&self.forces.push);
+        add_scaled(push, &self.ahead.push, 0.5);
+        let pass = Field { kernel, rest_density, push };
         core.sum(&pass, [&self.free], [&mut self.field]);
         let share = mean_share(core, dt, relaxation);
         let spacing = core.parameters.spacing();
