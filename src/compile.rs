@@ -249,7 +249,23 @@ impl Program {
     /// # Errors
     /// None that the file does not have with constant params.
     pub fn with_open_params(&self) -> Result<(Self, Vec<String>), Error> {
-        let mut open = OpenParams::default();
+        self.opened(OpenParams::default())
+    }
+
+    /// As [`with_open_params`](Self::with_open_params), for some solids of the file, which are then its only ones
+    /// besides those that they are made of: a param that decides how another solid is built stays open.
+    ///
+    /// # Errors
+    /// None that the file does not have with constant params.
+    pub fn with_open_params_of<'a>(
+        &self,
+        solids: impl IntoIterator<Item = &'a str>,
+    ) -> Result<(Self, Vec<String>), Error> {
+        let solids = solids.into_iter().map(str::to_string).collect();
+        self.opened(OpenParams { solids: Some(solids), ..OpenParams::default() })
+    }
+
+    fn opened(&self, mut open: OpenParams) -> Result<(Self, Vec<String>), Error> {
         loop {
             let again = self.lowered_again(Options { open: Some(open.clone()), ..self.options.clone() })?;
             let names = again.module.fixed.iter().map(|&i| again.module.params[i as usize].name.clone());

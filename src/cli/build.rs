@@ -122,13 +122,14 @@ struct Made {
 
 /// The solid with its params as arguments, and what they are.
 fn open(program: &Program, solid: &Solid) -> Result<(Solid, Vec<Param>), Failure> {
-    let (opened, fixed) = program.with_open_params().map_err(choose::usage)?;
+    let (opened, fixed) = program.with_open_params_of([solid.name()]).map_err(choose::usage)?;
     let solid = opened.solid_with(solid.name(), rfm::Engine::Interpreter).map_err(choose::usage)?;
     if !fixed.is_empty() {
         note(format!(
-            "{} {} how a solid is built and {} as in the file",
+            "{} {} how `{}` is built and {} as in the file",
             fixed.iter().map(|name| format!("`{name}`")).collect::<Vec<_>>().join(", "),
             if fixed.len() == 1 { "decides" } else { "decide" },
+            solid.name(),
             if fixed.len() == 1 { "stays" } else { "stay" },
         ));
     }

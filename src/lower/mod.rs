@@ -23,6 +23,7 @@ mod lowering;
 mod maps;
 mod module;
 mod names;
+mod needed;
 mod offsets;
 mod outline;
 mod paths;
@@ -37,11 +38,11 @@ mod unused;
 mod value;
 pub mod vocabulary;
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeMap;
 use std::sync::OnceLock;
 
 pub use imports::{Imported, unread};
-pub use module::{Module, NamedSolid, ParamValue};
+pub use module::{Module, NamedSolid, OpenParams, ParamValue};
 pub use scene::{
     AskedMean, Bounce, Container, Fluid, Gravity, Obstacle, Opening, Picture, Run, Scene, SceneProbe, Skin,
     Solver, Tolerance, Truth,
@@ -103,13 +104,6 @@ impl Options {
             Some(place) => format!("{place}: {message}"),
         }
     }
-}
-
-/// Which params stay open.
-#[derive(Debug, Clone, Default)]
-pub struct OpenParams {
-    /// Names of those that are constants all the same.
-    pub fixed: BTreeSet<String>,
 }
 
 /// Most operations to which a short file may unroll by default.
@@ -181,7 +175,9 @@ fn lower_here(
     }
     lowering.scope.source = SourceId::File;
     lowering.announce(ast);
-    for item in &ast.items {
+    let needed = options.open.as_ref().and_then(|open| needed::names(ast, open.solids.as_ref()?));
+    let is_needed = |item: &&Item| needed.as_ref().is_none_or(|needed| needed.contains(&item.name().text));
+    for item in ast.items.iter().filter(is_needed) {
         lowering.item(item, options);
     }
     if !lowering.diagnostics.iter().any(|d| d.severity == Severity::Error) {

@@ -64,3 +64,12 @@ pub struct NamedSolid {
     /// Place of the name in its definition.
     pub span: Span,
 }
+
+/// Which params stay open, and for which solids.
+#[derive(Debug, Clone, Default)]
+pub struct OpenParams {
+    /// Names of those that are constants all the same.
+    pub fixed: BTreeSet<String>,
+    /// The solids that are read, with what they are made of; `None` for all of them.
+    pub solids: Option<BTreeSet<String>>,
+}

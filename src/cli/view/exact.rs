@@ -43,7 +43,8 @@ impl Field {
         if size > MOST_OPERATIONS {
             return too_large(size);
         }
-        let (opened, fixed) = checked.program.with_open_params().map_err(refused)?;
+        let (opened, fixed) =
+            checked.program.with_open_params_of(standing.iter().map(Solid::name)).map_err(refused)?;
         let solids = opened_solids(&opened, standing)?;
         let params = opened.module().params.iter();
         let params = params.map(|p| Param { name: p.name.clone(), value: p.value, doc: None });

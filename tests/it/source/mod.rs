@@ -315,6 +315,12 @@ fn params_that_stay_open_give_the_values_of_params_that_were_set() {
     let program = Program::from_source("s.rfm", text).unwrap_or_else(|e| panic!("{e}"));
     let (opened, fixed) = program.with_open_params().unwrap();
     assert_eq!(fixed, ["n"]);
+    // what another solid is built by stays open for this one
+    let more = format!("{text}\nlet k = side\nsolid row = any i in 0..k: s.move([i, 0, 0])");
+    let more = Program::from_source("s.rfm", more).unwrap_or_else(|e| panic!("{e}"));
+    assert_eq!(more.with_open_params().unwrap().1, ["n", "side"]);
+    assert_eq!(more.with_open_params_of(["s"]).unwrap().1, ["n"]);
+    assert_eq!(more.with_open_params_of(["row"]).unwrap().1, ["n", "side"]);
     let params = opened.module().params.iter();
     let params = params
         .map(|p| Param { name: p.name.clone(), value: p.value, doc: p.doc.clone() })

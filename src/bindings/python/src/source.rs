@@ -53,7 +53,7 @@ pub fn text(
     let mut solid = solid.clone();
     if open_params {
         let program = &program.bind(py).get().program;
-        let (opened, _) = program.with_open_params().map_err(|error| raised(py, error))?;
+        let (opened, _) = program.with_open_params_of([solid.name()]).map_err(|error| raised(py, error))?;
         let params = opened.module().params.iter();
         options.params = params
             .map(|param| Param { name: param.name.clone(), value: param.value, doc: param.doc.clone() })
