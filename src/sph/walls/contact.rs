@@ -209,14 +209,21 @@ pub(super) fn push_out_to(
     // thirteen lengths from reach/64 to reach
     for k in 0..=12 {
         let distance = reach * 2.0f64.powf(0.5 * f64::from(k) - 6.0);
+        let mut nearest: Option<Contact> = None;
         for direction in [DVec3::Z, DVec3::X, -DVec3::X, DVec3::Y, -DVec3::Y, -DVec3::Z] {
             let outside = inside + direction * distance;
             if omega(field, outside)? < 0.0 {
                 let found = contact(inside, outside)?;
-                if is_wanted(found.point) {
-                    return Ok(Some(found));
+                let is_nearer = nearest
+                    .as_ref()
+                    .is_none_or(|known| found.point.distance(inside) < known.point.distance(inside));
+                if is_nearer && is_wanted(found.point) {
+                    nearest = Some(found);
                 }
             }
+        }
+        if nearest.is_some() {
+            return Ok(nearest);
         }
     }
     Ok(None)
@@ -326,6 +333,12 @@ mod tests {
             let out = push_out(&*sphere, start, 2.0, 0.0).unwrap().unwrap();
             assert!((out.point.distance(DVec3::ONE) - 0.5).abs() < 1e-12, "{out:?}");
             assert!(sphere.omega(out.point) < 0.0 && out.normal.is_normalized());
+        }
+        // Newton's step of 1.2 is not within this reach: the shortest of the ways along the axes is
+        let ball = scenes::sphere(DVec3::ZERO, 0.5);
+        for start in [DVec3::X, -DVec3::X, DVec3::Y, -DVec3::Z].map(|axis| 0.1 * axis) {
+            let out = push_out(&*ball, start, 0.5, 0.0).unwrap().unwrap();
+            assert!((out.point - 5.0 * start).length() < 1e-12, "{start}: {out:?}");
         }
         let everywhere = Closures { omega: |_: DVec3| 1.0, gradient: |_: DVec3| DVec3::ZERO };
         assert_eq!(push_out(&everywhere, DVec3::ZERO, 2.0, 0.0), Ok(None));

@@ -271,9 +271,10 @@ enum RfmStatus rfm_contact_many_f32(const struct RfmSolid *solid,
                                     struct RfmError **error);
 
 // Puts particles that are inside a solid, or on its surface, back outside, at most `reach` metres away. Those that are not
-// deep in it go to the nearest place, others to where the formula's slope leads, which may be farther. Reflects their
-// velocities relative to that of the surface: the part `restitution` of the normal speed returns, and the tangential
-// speed loses at most `friction` times the change of the normal speed. Particles that stay outside keep their bits.
+// deep in it go to the nearest place, others to where the formula's slope leads if that is within reach, and otherwise
+// the shortest way along an axis, which both may be farther. Reflects their velocities relative to that of the surface:
+// the part `restitution` of the normal speed returns, and the tangential speed loses at most `friction` times the change
+// of the normal speed. Particles that stay outside keep their bits.
 // `collisions` may be null. The first call for a solid of many parts takes longer, because it finds out which of them
 // matter where; see rfm_solid_within.
 enum RfmStatus rfm_collide(const struct RfmSolid *solid,
@@ -710,9 +711,10 @@ enum RfmStatus rfm_contact_many_f32(const struct RfmSolid *solid,
                                     struct RfmError **error);
 
 // Puts particles that are inside a solid, or on its surface, back outside, at most `reach` metres away. Those that are not
-// deep in it go to the nearest place, others to where the formula's slope leads, which may be farther. Reflects their
-// velocities relative to that of the surface: the part `restitution` of the normal speed returns, and the tangential
-// speed loses at most `friction` times the change of the normal speed. Particles that stay outside keep their bits.
+// deep in it go to the nearest place, others to where the formula's slope leads if that is within reach, and otherwise
+// the shortest way along an axis, which both may be farther. Reflects their velocities relative to that of the surface:
+// the part `restitution` of the normal speed returns, and the tangential speed loses at most `friction` times the change
+// of the normal speed. Particles that stay outside keep their bits.
 // `collisions` may be null. The first call for a solid of many parts takes longer, because it finds out which of them
 // matter where; see rfm_solid_within.
 enum RfmStatus rfm_collide(const struct RfmSolid *solid,
