@@ -27,6 +27,7 @@ pub(super) struct Facts {
     pub area: Option<f64>,
     /// As that of the volume.
     pub area_error: Option<f64>,
+    /// Those of the solid: one that is hollow is one, although its surface has two.
     pub components: Option<usize>,
     /// Whether two resolutions have as many components, and no part but the edges of wedges is too thin for the cells
     /// with which the volume was measured. If not, the volume, the area and their errors are those of what the finer
@@ -164,8 +165,10 @@ fn print_solid(solid: &Facts) {
         let cells = solid.cells.unwrap_or(VOLUME_CELLS);
         let half = cells / 2;
         match coarser == components {
-            true => say!("    components  {components}"),
-            false => say!("    components  {components}, but {coarser} with {half} cells instead of {cells}"),
+            true => say!("    components  {components} of the solid"),
+            false => say!(
+                "    components  {components} of the solid, but {coarser} with {half} cells instead of {cells}"
+            ),
         }
     }
     match solid.cells {

@@ -32,6 +32,7 @@ pub(super) struct MeshSummary {
     triangles: usize,
     closed: bool,
     manifold: bool,
+    /// Those of the surface: a hollow solid has two.
     components: usize,
     euler: i64,
     volume: f64,
@@ -140,7 +141,7 @@ impl MeshSummary {
             self.evaluations
         );
         say!(
-            "closed: {}, manifold: {}, components: {}, Euler characteristic: {}",
+            "closed: {}, manifold: {}, components of the surface: {}, Euler characteristic: {}",
             yes(self.closed),
             yes(self.manifold),
             self.components,
