@@ -8,7 +8,7 @@ use super::lowering::Lowering;
 use super::scene::declaration::{SceneKey, declare_keys, names};
 use super::scene::run::times_as_written;
 use super::scene::{AskedMean, Block, SceneProbe};
-use crate::diagnostic::{Code, Diagnostic};
+use crate::diagnostic::{Code, Diagnostic, SourceId};
 use crate::geom::Aabb;
 use crate::quantity::Dimension;
 use crate::sph::Probe;
@@ -279,9 +279,19 @@ impl<'a> Lowering<'a> {
         };
         let found = known.iter().position(|other| other == name);
         if found.is_none() {
+            let unnamed =
+                |other: &&str| *other == "obstacle" && self.names.of(SourceId::File, other).is_none();
             let help = match known {
                 [] => "it has none".to_string(),
-                known => format!("there is {}", known.join(", ")),
+                // the name of bodies whose solids are written in the scene
+                known if known.iter().any(unnamed) => format!(
+                    "a shape that is written in the scene is called `obstacle`: write `{key}: obstacle`, or define \
+                     `solid {name} = …` above the scene and write `solid: {name}`"
+                ),
+                known => {
+                    let known: Vec<String> = known.iter().map(|other| format!("`{other}`")).collect();
+                    format!("it has {}", known.join(", "))
+                }
             };
             self.report(
                 Diagnostic::error(Code::UNKNOWN_NAME, value.span, format!("`{name}` is no {what}"))
