@@ -84,6 +84,11 @@ impl<'a> Lowering<'a> {
         if source == SourceId::Prelude && name == "box" && self.box_of_one_corner(arguments, span) {
             return Value::Failed;
         }
+        if source == SourceId::Prelude
+            && let Some(diagnostic) = self.solid_of_other_tools(name, arguments)
+        {
+            return self.fail(diagnostic);
+        }
         let Some(mut bound) = self.bind((function, source), arguments, span) else { return Value::Failed };
         let call = Call { function: name.clone(), source, span };
         let mut calls = self.scope.calls.clone();

@@ -197,6 +197,11 @@ impl Lowering<'_> {
         let message = format!("`{name}` takes {expected} argument{plural}, found {}", arguments.len());
         let diagnostic = Diagnostic::error(Code::ARGUMENTS, self.user_span(span), message);
         Some(match (name, example(name)) {
+            ("atan", _) if arguments.len() == 2 => {
+                let written: Option<Vec<&str>> = arguments.iter().map(|a| self.written(&a.value)).collect();
+                let written = written.map_or("y, x".to_string(), |both| both.join(", "));
+                diagnostic.help(format!("the angle of two sides is `atan2` here: write `atan2({written})`"))
+            }
             ("round", _) => diagnostic.help("edges are rounded by a method of shapes: `box().round(0.1)`"),
             (_, Some(call)) => diagnostic.help(format!("write for example `{call}`")),
             (_, None) => diagnostic,
@@ -342,7 +347,16 @@ impl Lowering<'_> {
         };
         let at = self.user_span(origin.unwrap_or(span));
         let message = format!("{what} must be positive, found {number}");
-        self.fail(Diagnostic::error(Code::OUT_OF_RANGE, at, message))
+        let diagnostic = Diagnostic::error(Code::OUT_OF_RANGE, at, message);
+        if number >= 0.0 || what != "the thickness of a shell" {
+            return self.fail(diagnostic);
+        }
+        let written = self.written_at(at).and_then(|text| text.strip_prefix('-')).map(str::trim_start);
+        let width = written.map_or_else(|| (-number).to_string(), str::to_string);
+        self.fail(diagnostic.help(format!(
+            "a wall lies inside of the surface: write `.shell({width})`; for one outside of it, write \
+             `.offset({width}).shell({width})`"
+        )))
     }
 }
 

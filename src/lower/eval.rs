@@ -295,6 +295,7 @@ impl Lowering<'_> {
     /// Whole exponents up to 64 are products (by repeated squaring), ½ is the root, the rest is `pow`.
     fn power(&mut self, base: &Expr, exponent: &Expr, span: Span) -> Value {
         let (Some(a), Some(b)) = (self.field(base), self.field(exponent)) else { return Value::Failed };
+        self.warn_of_power_of_shapes(base, exponent);
         Value::Number(self.raise(a, b, span))
     }
 

@@ -1,5 +1,7 @@
 //! Functions, values and methods of OpenSCAD, POV-Ray, GLSL and Python: how to write here what they do there.
 
+mod solids;
+
 use super::lowering::Lowering;
 use crate::diagnostic::{Code, Diagnostic};
 use crate::syntax::ast::{Argument, Expr, ExprKind, Name};
@@ -139,7 +141,7 @@ pub(super) fn parameter(function: &str, given: &str, parameters: &[&str]) -> Opt
         "d" | "diameter" | "dia" => parameters.contains(&"r").then(|| {
             format!("its radius is `r`, half of `{given}`; its parameters are {}", parameters.join(", "))
         }),
-        "r1" | "r2" | "rtop" | "rbottom" | "d1" | "d2" if matches!(function, "cylinder" | "cone") => Some(
+        "rtop" | "rbottom" if matches!(function, "cylinder" | "cone") => Some(
             "a cone that does not end in a point is a cylinder made narrower upwards: write for example \
              `cylinder(2, 3).taper(3, 0.5)`, which is half as wide at its top"
                 .to_string(),
@@ -193,12 +195,23 @@ fn joined(name: &str, a: &[&str]) -> Option<Words> {
         [] | [_] => format!("a {op} b"),
         all => all.iter().map(|text| foreign::operand(text)).collect::<Vec<_>>().join(&format!(" {op} ")),
     };
+    if let Some(words) = joined_smoothly(name, a) {
+        return Some(words);
+    }
     match name {
+        // max(−a, b) elsewhere
+        "opSubtraction" => match a {
+            [a, b] => {
+                let [a, b] = [a, b].map(|text| foreign::operand(text));
+                written("`\\` here: the second without the first", &format!("{b} \\ {a}"))
+            }
+            _ => written("`\\` here, which is without", "a \\ b"),
+        },
         "union" | "unite" | "merge" | "fuse" | "join" | "combine" | "opUnion" | "add" | "sdUnion" => {
             written("`or` here", &chain("or"))
         }
         "intersection" | "intersect" | "common" | "opIntersection" => written("`and` here", &chain("and")),
-        "difference" | "subtract" | "cut" | "opSubtraction" | "diff" | "minus" | "remove" | "without" => {
+        "difference" | "subtract" | "cut" | "diff" | "minus" | "remove" | "without" => {
             written("`\\` here, which is without", &chain("\\"))
         }
         "xor" | "symmetric_difference" | "opXor" => match a {
@@ -212,16 +225,10 @@ fn joined(name: &str, a: &[&str]) -> Option<Words> {
             [only] => written("`not` here", &format!("not {}", foreign::operand(only))),
             _ => written("`not` here", "not a"),
         },
-        "smooth_union" | "smin" | "opSmoothUnion" | "blend" | "fillet" | "rounding" => words(
+        "smooth_union" | "opSmoothUnion" | "blend" | "fillet" | "rounding" => words(
             "`blend`, `smooth_or` or `.round` here",
             "write `blend(a, b, 0.1)` for a fillet of radius 0.1 between two shapes, `(a or b).round(0.1)` for all edges of a shape",
         ),
-        "smax" | "smooth_intersection" | "opSmoothIntersection" => {
-            written("`smooth_and` here", "smooth_and(a, b, 0.1)")
-        }
-        "smooth_difference" | "opSmoothSubtraction" => {
-            written("`smooth_without` here", "smooth_without(a, b, 0.1)")
-        }
         "bevel" | "chamfer" => written("`chamfer` here", "chamfer(a, b, 0.1)"),
         "dilate" | "erode" | "inflate" => written("`.offset` here", "sphere(1).offset(0.1)"),
         "onion" | "thicken" | "hollow" => written("`.shell` here", "sphere(1).shell(0.1)"),
@@ -239,6 +246,59 @@ fn joined(name: &str, a: &[&str]) -> Option<Words> {
         "color" | "colour" | "material" | "texture" | "pigment" => {
             words("shapes have no colour", "leave it out")
         }
+        _ => None,
+    }
+}
+
+/// Shapes that are joined with a width of the joint, as in `smin(a, b, 0.1)` and `opUnion(a, b, 0.1)`.
+fn joined_smoothly(name: &str, a: &[&str]) -> Option<Words> {
+    let is_number = |text: &str| text.starts_with(|c: char| c.is_ascii_digit() || c == '.');
+    let call = |function: &str| match a {
+        [a, b, width] => format!("{function}({a}, {b}, {width})"),
+        [a, b] => format!("{function}({a}, {b}, 0.1)"),
+        _ => format!("{function}(a, b, 0.1)"),
+    };
+    let has_a_width = matches!(a, [_, _, _]);
+    match name {
+        "smin" | "smooth_min" | "smoothmin" | "smoothMin" | "soft_min" | "softmin" | "sminCubic" => words(
+            "`smooth_or` here: the smaller of two distances is that of the union",
+            &format!(
+                "to join shapes, write `{}`; for the smaller of two numbers, write `{}`",
+                call("smooth_or"),
+                call("smooth_and")
+            ),
+        ),
+        "smax" | "smooth_max" | "smoothmax" | "smoothMax" | "soft_max" | "softmax" | "smaxCubic" => words(
+            "`smooth_and` here: the larger of two distances is that of the common part",
+            &format!(
+                "for what two shapes share, write `{}`; for the larger of two numbers, write `{}`",
+                call("smooth_and"),
+                call("smooth_or")
+            ),
+        ),
+        "smooth_union" | "opSmoothUnion" if has_a_width => written("`smooth_or` here", &call("smooth_or")),
+        "smooth_intersection" | "opSmoothIntersection" => written("`smooth_and` here", &call("smooth_and")),
+        "smooth_difference" | "smooth_subtraction" | "smooth_subtract" => {
+            written("`smooth_without` here", &call("smooth_without"))
+        }
+        // the first is taken away from the second elsewhere
+        "opSmoothSubtraction" => match a {
+            [a, b, rest @ ..] => written(
+                "`smooth_without` here: the second without the first",
+                &format!("smooth_without({b}, {a}, {})", rest.first().unwrap_or(&"0.1")),
+            ),
+            _ => written("`smooth_without` here", "smooth_without(a, b, 0.1)"),
+        },
+        "union" | "opUnion" | "sdUnion" if has_a_width && is_number(a[2]) => {
+            written("`smooth_or` here", &call("smooth_or"))
+        }
+        "intersection" | "intersect" | "opIntersection" if has_a_width && is_number(a[2]) => {
+            written("`smooth_and` here", &call("smooth_and"))
+        }
+        "difference" | "subtract" if has_a_width && is_number(a[2]) => {
+            written("`smooth_without` here", &call("smooth_without"))
+        }
+        "opSubtraction" if has_a_width && is_number(a[2]) => joined_smoothly("opSmoothSubtraction", a),
         _ => None,
     }
 }

@@ -6,6 +6,7 @@ use rustc_hash::FxHashMap;
 use super::dimensions::Measure;
 use super::lowering::Lowering;
 use super::names::{Kind, TIME};
+use super::value::Value;
 use crate::diagnostic::{Code, Diagnostic, SourceId, Span};
 use crate::ir::{Binary, Node};
 use crate::quantity::{Dimension, parse_unit};
@@ -16,9 +17,44 @@ impl Lowering<'_> {
     /// The field of a solid, in which only lengths and angles have units.
     pub fn shape(&mut self, expr: &Expr) -> Option<Node> {
         let outer = std::mem::replace(&mut self.in_shape, true);
-        let node = self.field(expr);
+        let value = self.expr(expr);
         self.in_shape = outer;
-        node
+        if value != Value::Failed
+            && let Some(diagnostic) = self.list_as_a_shape(&value, expr)
+        {
+            self.report(diagnostic);
+            return None;
+        }
+        self.as_number(&value, self.origin(expr))
+    }
+
+    /// The message for a list of shapes where one shape is asked for.
+    fn list_as_a_shape(&mut self, value: &Value, expr: &Expr) -> Option<Diagnostic> {
+        let written = match (&expr.kind, value) {
+            (ExprKind::Vector(parts), _) if !parts.is_empty() => {
+                if !parts.iter().all(|part| self.is_shape(part)) {
+                    return None;
+                }
+                let parts: Option<Vec<String>> =
+                    parts.iter().map(|part| self.written(part).map(foreign::operand)).collect();
+                parts.map_or("a or b".to_string(), |parts| parts.join(" or "))
+            }
+            // three shapes are a vector, as `[x, y, z]` is
+            (ExprKind::Name(name), Value::List(members)) => {
+                let is_shape =
+                    |member: &Value| matches!(member, Value::Number(node) if self.depends_on_place(*node));
+                if !members.iter().all(is_shape) {
+                    return None;
+                }
+                format!("any part in {name}: part")
+            }
+            _ => return None,
+        };
+        let message = "a list of shapes is no shape";
+        Some(
+            Diagnostic::error(Code::WRONG_TYPE, self.user_span(expr.span), message)
+                .help(format!("to join them, write `{written}`")),
+        )
     }
 
     /// Reports a number that no `f64` can hold.
@@ -118,6 +154,19 @@ impl Lowering<'_> {
             Diagnostic::warning(Code::SHAPES_AS_NUMBERS, left.span.to(right.span), message)
                 .help(format!("{purpose}, write `{written}`")),
         );
+    }
+
+    /// Warns of a power of two shapes, as in `sphere(1) ^ box()`, which some languages have for what is in one alone.
+    pub fn warn_of_power_of_shapes(&mut self, base: &Expr, exponent: &Expr) {
+        if !(self.is_shape(base) && self.is_shape(exponent)) {
+            return;
+        }
+        let [a, b] = [(base, "a"), (exponent, "b")]
+            .map(|(expr, other)| foreign::operand(self.written(expr).unwrap_or(other)));
+        let message = "`^` raises the value of a shape to that of another; it does not join or cut them";
+        self.report(Diagnostic::warning(Code::SHAPES_AS_NUMBERS, base.span.to(exponent.span), message).help(
+            format!("for what is in one of them and not in both, write `({a} or {b}) \\ ({a} and {b})`"),
+        ));
     }
 
     /// Warns of `sum` over shapes, as in `sum i in 0..3: sphere(1).move([i, 0, 0])`.

@@ -2,6 +2,7 @@
 //! habits from another language.
 
 mod heads;
+mod ranges;
 mod units;
 
 use super::foreign;
@@ -84,6 +85,9 @@ impl<'t> Slip<'t> {
         if KEYWORDS.contains(&self.found) && called && !self.ends_an_operand() {
             return self.operator_as_a_function();
         }
+        if let Some(known) = self.word_behind_a_value() {
+            return Some(known);
+        }
         if self.on_its_line().trim().is_empty() {
             return Some(self.first_word());
         }
@@ -102,11 +106,6 @@ impl<'t> Slip<'t> {
         }
         if matches!(last_word(line), "NOT" | "Not") {
             return Some(self.syntax("there is no operator `NOT`").help("write `not a`"));
-        }
-        if self.found == "in"
-            && let Some(diagnostic) = self.fold_as_a_call()
-        {
-            return Some(diagnostic);
         }
         if last_word(line) == "for" {
             return Some(
@@ -363,6 +362,9 @@ impl<'t> Slip<'t> {
     /// A character that has no meaning where it stands.
     fn mark(&self) -> Option<Diagnostic> {
         let (before, after) = (self.before(), self.after());
+        if let Some(known) = self.range_as_a_vector().or_else(|| self.member_of_a_range()) {
+            return Some(known);
+        }
         if let Some(known) = self.vector_in_brackets().or_else(|| self.range_without_in()) {
             return Some(known);
         }
@@ -505,7 +507,9 @@ fn last_part(text: &str) -> &str {
                 start = at + c.len_utf8();
             }
             ')' | ']' => start = around.pop().unwrap_or(start),
-            '=' | ':' | ',' | '&' | '|' | '\\' | '<' | '>' => start = at + c.len_utf8(),
+            '=' | ':' | ',' | '&' | '|' | '\\' | '<' | '>' | '∧' | '∨' | '≤' | '≥' => {
+                start = at + c.len_utf8()
+            }
             _ => {}
         }
         if [" and ", " or ", " not "].iter().any(|word| text[..at].ends_with(word)) {

@@ -2,6 +2,7 @@
 //! suggests is accepted as it stands.
 
 mod commands;
+mod half_remembered;
 
 use rfm::diagnostic::{Diagnostics, Source};
 use rfm::lower::Options;

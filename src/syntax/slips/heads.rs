@@ -5,7 +5,7 @@ use super::{Slip, bracketed, fits, last_word};
 use crate::diagnostic::{Code, Diagnostic, Span};
 
 /// What begins a fold.
-const FOLDS: [&str; 6] = ["any", "all", "sum", "product", "min", "max"];
+pub(super) const FOLDS: [&str; 6] = ["any", "all", "sum", "product", "min", "max"];
 
 impl Slip<'_> {
     /// A mark that stands where the head of something is written otherwise.
@@ -16,12 +16,13 @@ impl Slip<'_> {
             "," => self.two_variables(),
             "(" => self
                 .fold_as_a_call()
+                .or_else(|| self.fold_of_three())
                 .or_else(|| self.function_by_let())
                 .or_else(|| self.obstacle_by_a_shape()),
             "[" => self.range_in_brackets(),
-            ":" => self.type_of_a_param(),
+            ":" => self.type_of_a_param().or_else(|| self.value_behind_a_colon()),
             "-" => self.name_with_a_dash(),
-            "." => self.box_as_a_range(),
+            "." => self.box_as_a_range().or_else(|| self.fold_of_three()),
             "}" => self.block_without_a_key(),
             found if found.starts_with(|c: char| c.is_ascii_digit()) => self.vector_without_commas(),
             _ => None,
@@ -139,23 +140,6 @@ impl Slip<'_> {
             Diagnostic::error(Code::SYNTAX, span, format!("`{block}` has no block"))
                 .at("expected `{`")
                 .help(format!("write `{written}`"))
-        })
-    }
-
-    /// `param r = 1 [0.1, 5]`
-    fn range_in_brackets(&self) -> Option<Diagnostic> {
-        let param = self.on_its_line().trim();
-        let (inner, _) = self.after().lines().next()?.split_once(']')?;
-        let (low, high) = inner.split_once([',', ';'])?;
-        (param.starts_with("param ") && param.contains('=') && fits(&[param, inner])).then(|| {
-            // the bounds have the unit of the value
-            let value = param.rsplit_once('=').map_or("", |(_, value)| value.trim());
-            let unit = value.split_once(' ').map_or("", |(_, unit)| unit);
-            let [low, high] = [low, high].map(|bound| match bound.trim().parse::<f64>() {
-                Ok(_) => format!("{} {unit}", bound.trim()).trim_end().to_string(),
-                Err(_) => bound.trim().to_string(),
-            });
-            self.unexpected().help(format!("a range follows `in`: write `{param} in {low} .. {high}`"))
         })
     }
 

@@ -1,0 +1,241 @@
+//! Slips in ranges: of params, of folds, and of what lies between two bounds.
+
+use super::super::foreign;
+use super::heads::FOLDS;
+use super::{Slip, bracketed, first_part, fits, last_part, last_word, parts};
+use crate::diagnostic::Diagnostic;
+
+impl Slip<'_> {
+    /// The whole line of the place.
+    fn line(&self) -> &str {
+        let start = self.at - self.on_its_line().len();
+        self.text[start..].lines().next().unwrap_or_default()
+    }
+
+    /// `param r = 1 [0.1, 5]`
+    pub(super) fn range_in_brackets(&self) -> Option<Diagnostic> {
+        let param = self.on_its_line().trim();
+        let (inner, _) = self.after().lines().next()?.split_once(']')?;
+        self.range_of(param, inner)
+    }
+
+    /// `param r = 1 in [0.5, 2]` and `param r = 1 in (0.5, 2)`
+    pub(super) fn range_as_a_vector(&self) -> Option<Diagnostic> {
+        // at the end of an item the place may be a line further down
+        let line = match self.found {
+            "" | "\"" => self.before().lines().last()?,
+            "," => self.line(),
+            _ => return None,
+        };
+        let (param, range) = line.trim().split_once(" in ")?;
+        let inner = range.trim_start().strip_prefix(['[', '('])?;
+        let (inner, _) = inner.split_once([']', ')'])?;
+        self.range_of(param, inner)
+    }
+
+    /// The message for a range that was written as two numbers in brackets.
+    fn range_of(&self, param: &str, inner: &str) -> Option<Diagnostic> {
+        let (low, high) = inner.split_once([',', ';'])?;
+        (param.starts_with("param ") && param.contains('=') && fits(&[param, inner])).then(|| {
+            // the bounds have the unit of the value
+            let value = param.rsplit_once('=').map_or("", |(_, value)| value.trim());
+            let unit = value.split_once(' ').map_or("", |(_, unit)| unit);
+            let [low, high] = [low, high].map(|bound| match bound.trim().parse::<f64>() {
+                Ok(_) => format!("{} {unit}", bound.trim()).trim_end().to_string(),
+                Err(_) => bound.trim().to_string(),
+            });
+            let message = match self.found {
+                "" => self.syntax("a range has no brackets"),
+                _ => self.unexpected(),
+            };
+            message.help(format!("a range follows `in`: write `{param} in {low} .. {high}`"))
+        })
+    }
+
+    /// `param r: 1 mm .. 5 mm` and `param r: 1`
+    pub(super) fn value_behind_a_colon(&self) -> Option<Diagnostic> {
+        let head = self.on_its_line().trim();
+        let line = self.after().lines().next()?;
+        let value = line.split(['"', '#']).next()?.trim();
+        let (item, name) = head.split_once(' ')?;
+        let is_head = ["param", "let", "solid"].contains(&item) && last_word(name) == name.trim();
+        if !is_head || self.in_braces() || !fits(&[head, value]) {
+            return None;
+        }
+        let (range, value) = match value.split_once("..") {
+            Some((low, _)) if item == "param" && !value.contains(" in ") => {
+                (format!(" in {value}"), low.trim())
+            }
+            _ => (String::new(), value),
+        };
+        let written = format!("write `{head} = {value}{range}`");
+        Some(self.unexpected().help(if range.is_empty() {
+            format!("a value follows `=`: {written}")
+        } else {
+            format!("a param has a value, and then a range: {written}, or with another value between the two")
+        }))
+    }
+
+    /// `sum(i, 0..5, i)`
+    pub(super) fn fold_of_three(&self) -> Option<Diagnostic> {
+        let line = self.on_its_line();
+        let open = if self.found == "(" { self.at } else { self.at - line.len() + line.rfind('(')? };
+        let fold = last_word(self.text[..open].trim_end());
+        let all = parts(bracketed(&self.text[open..])?);
+        let [variable, members, body] = all[..] else { return None };
+        let is_fold = FOLDS.contains(&fold)
+            && last_word(variable) == variable
+            && (members.contains("..") || members.starts_with('['))
+            && fits(&[variable, members, body]);
+        is_fold.then(|| {
+            self.unexpected()
+                .help(format!("a fold has no brackets: write `{fold} {variable} in {members}: {body}`"))
+        })
+    }
+
+    /// `z ∈ [0, 1]`, and `z in [0, 1]`
+    pub(super) fn member_of_a_range(&self) -> Option<Diagnostic> {
+        if !matches!(self.found, "∈" | "in") || !self.ends_an_operand() {
+            return None;
+        }
+        let value = last_part(self.on_its_line()).trim();
+        let item = self.line().split_whitespace().next().unwrap_or_default();
+        let first = value.split_whitespace().next().unwrap_or_default();
+        let is_number = value.starts_with(|c: char| c.is_ascii_digit() || c == '.');
+        if is_number || FOLDS.contains(&first) || first == "for" || ["param", "let"].contains(&item) {
+            return None;
+        }
+        let rest = self.after().lines().next().unwrap_or_default().trim_start();
+        let bounds = match rest.strip_prefix(['[', '(']) {
+            Some(inner) => inner.split([']', ')']).next().and_then(|inner| inner.split_once(',')),
+            None => first_part(rest).split_once(".."),
+        };
+        let written = match bounds {
+            Some((low, high)) if fits(&[low.trim(), value, high.trim()]) => {
+                format!("{} <= {value} <= {}", low.trim(), high.trim())
+            }
+            _ if self.found == "in" => return None,
+            _ => "0 <= z <= 1".to_string(),
+        };
+        Some(
+            self.unexpected()
+                .help(format!("what lies between two bounds is compared with both: write `{written}`")),
+        )
+    }
+
+    /// `any k in 0..5 step 2: …`, `… where r = 2`, and `z in [0, 1]`
+    pub(super) fn word_behind_a_value(&self) -> Option<Diagnostic> {
+        match self.found {
+            "step" | "by" => self.step_of_a_range(),
+            "where" => self.value_behind_where(),
+            "in" => self.fold_as_a_call().or_else(|| self.member_of_a_range()),
+            _ => None,
+        }
+    }
+
+    /// `any k in 0..5 step 2: sphere(0.1).move([k, 0, 0])`
+    fn step_of_a_range(&self) -> Option<Diagnostic> {
+        let (head, range) = self.on_its_line().rsplit_once(" in ")?;
+        let variable = last_word(head.trim_end());
+        let fold = last_word(head.trim_end().strip_suffix(variable)?.trim_end());
+        let (start, end) = range.split_once("..")?;
+        if !FOLDS.contains(&fold) || variable.is_empty() {
+            return None;
+        }
+        let (step, body) = self.after().lines().next()?.split_once(':')?;
+        let [start, end, step] = [start, end, step].map(str::trim);
+        let body = first_part(body);
+        if !fits(&[start, end, step, body]) {
+            return None;
+        }
+        let count = match [start, end, step].map(str::parse::<f64>) {
+            [Ok(first), Ok(last), Ok(width)] => {
+                let count = ((last - first) / width - 1e-9).ceil();
+                if !(1.0..=1e9).contains(&count) {
+                    return None;
+                }
+                count.to_string()
+            }
+            _ => {
+                let [start, end, step] = [start, end, step].map(foreign::operand);
+                let length = if start == "0" { end } else { format!("({end} - {start})") };
+                format!("ceil({length}/{step})")
+            }
+        };
+        let body = replaced(body, variable, &multiple(start, step, variable));
+        let written = format!("{fold} {variable} in 0..{count}: {body}");
+        let diagnostic = self.syntax("a range has steps of 1");
+        Some(diagnostic.help(format!("count the steps, and multiply: write `{written}`")))
+    }
+
+    /// `x^2 <= r^2 where r = 2`
+    fn value_behind_where(&self) -> Option<Diagnostic> {
+        let rest = self.after().lines().next().unwrap_or_default().split('#').next().unwrap_or_default();
+        let is_definition = |part: &&str| {
+            part.split_once('=').is_some_and(|(name, value)| {
+                let name = name.trim();
+                !name.is_empty() && last_word(name) == name && !value.starts_with('=')
+            })
+        };
+        let all = parts(rest.trim());
+        if self.in_braces() || !self.ends_an_operand() || all.is_empty() || !all.iter().all(is_definition) {
+            return None;
+        }
+        let written = match fits(&all) {
+            true => all.iter().map(|part| format!("`let {part}`")).collect::<Vec<_>>().join(" and "),
+            false => "`let r = 2`".to_string(),
+        };
+        let diagnostic = self.syntax("a name is defined in front of what has it");
+        Some(diagnostic.help(format!("write {written} above, on a line of its own")))
+    }
+}
+
+/// The value of a step: `2*k`, `1 + 2*k` or `5 - k`.
+fn multiple(start: &str, step: &str, variable: &str) -> String {
+    let (sign, step) = match step.strip_prefix('-') {
+        Some(rest) => ('-', rest.trim_start()),
+        None => ('+', step),
+    };
+    let product = match step.parse::<f64>() {
+        Ok(1.0) => variable.to_string(),
+        Ok(_) => format!("{step}*{variable}"),
+        Err(_) => format!("{}*{variable}", foreign::operand(step)),
+    };
+    match (start.parse() == Ok(0.0), sign) {
+        (true, '+') => product,
+        (true, _) => format!("-{product}"),
+        (false, _) => format!("{start} {sign} {product}"),
+    }
+}
+
+/// A formula with a value in place of a name: in brackets, unless it stands alone between commas or brackets.
+fn replaced(formula: &str, name: &str, value: &str) -> String {
+    let is_part = |c: char| c.is_alphanumeric() || c == '_';
+    let mut written = String::new();
+    let mut rest = formula;
+    while let Some(at) = rest.find(name) {
+        let (before, behind) = (&rest[..at], &rest[at + name.len()..]);
+        written += before;
+        let is_name = !written.ends_with(|c: char| is_part(c) || c == '.') && !behind.starts_with(is_part);
+        let is_alone = |text: &str| text.is_empty() || text.ends_with(['(', '[', ',']);
+        let ends = behind.trim_start().is_empty() || behind.trim_start().starts_with([')', ']', ',']);
+        match (is_name, is_alone(written.trim_end()) && ends) {
+            (false, _) => written += name,
+            (true, true) => written += value,
+            (true, false) => written += &format!("({value})"),
+        }
+        rest = behind;
+    }
+    written + rest
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_are_replaced_where_they_stand_alone() {
+        assert_eq!(replaced("ball([k, 0, k^2], kr).k", "k", "2*k"), "ball([2*k, 0, (2*k)^2], kr).k");
+        assert_eq!(replaced("k", "k", "5 - k"), "5 - k");
+    }
+}

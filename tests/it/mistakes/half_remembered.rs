@@ -1,0 +1,129 @@
+//! Syntax that is half remembered: what the messages suggest is the call, the range or the joint that was meant.
+
+use super::{alone, messages, program, read, told};
+
+const TEXTS: &[&str] = &[
+    "solid s = smooth_min(sphere(1), box(), 0.1)",
+    "solid s = smax(sphere(1), box(), 0.1)",
+    "solid s = soft_min(sphere(1), box())",
+    "solid s = opSmoothUnion(sphere(1), box(), 0.2)",
+    "solid s = opSmoothIntersection(sphere(1), box(), 0.2)",
+    "solid s = opSmoothSubtraction(sphere(1), box(), 0.2)",
+    "solid s = opSubtraction(sphere(0.5), box())",
+    "solid s = opUnion(sphere(1), box(), 0.1)",
+    "solid s = intersection(sphere(1), box(), 0.1)",
+    "solid s = difference(sphere(1), box(), 0.1)",
+    "solid s = any k in 0..5 step 2: sphere(0.1).move([k, 0, 0])",
+    "solid s = any k in 1..4 by 0.5: ball([k, k^2, 0], 0.3)",
+    "solid s = any k in 5..0 step -1: ball([k, 0, 0], 0.3)",
+    "param n = 6\nsolid s = any k in 0..n step 2: sphere(0.1).move([k, 0, 0])",
+    "solid s = x^2 + y^2 + z^2 <= r^2 where r = 2",
+    "solid s = (sphere(1) ^ sphere(2)) and box()",
+    "param r = 1 in [0.5, 2]\nsolid s = sphere(r)",
+    "param r = 10 mm in (5, 20) \"radius\"\nsolid s = sphere(r)",
+    "param r: 1 mm .. 5 mm\nsolid s = sphere(r)",
+    "param r: 2\nsolid s = sphere(r)",
+    "solid s = sphere(1).shell(-0.1)",
+    "solid s = sphere(1).shell(-2 mm)",
+    "solid s = box(center=[0, 0, 0], size=[1, 1, 1])",
+    "solid s = box(center=[1, 2, 3], size=2)",
+    "solid s = box(size=[1 cm, 2 cm, 3 cm], center=true)",
+    "solid s = [sphere(1), sphere(2) and box()]",
+    "let k = sum(i, 0..5, i)\nsolid s = sphere(k)",
+    "solid s = any(i, 0..5, ball([i, 0, 0], 0.3))",
+    "solid s = sqrt(x² + y²) ≤ 1 ∧ z ∈ [0, 1]",
+    "solid s = sphere(1) and z in [0, 1]",
+    "solid s = sphere(1) and z in 0..1",
+    "solid s = atan(y, x) <= 1 and sphere(1)",
+    "solid s = cylinder(h=2, r1=1, r2=0.5)",
+    "solid s = cylinder(h=3, d1=2 mm, d2=1 mm)",
+    "solid s = cylinder(h=3, r1=0, r2=1)",
+    "solid s = cylinder(h=3, r1=1, r2=0)",
+];
+
+#[test]
+fn syntax_that_is_half_remembered() {
+    read("half_remembered", alone(TEXTS));
+}
+
+/// Each mistake with its first suggestion in its place.
+#[test]
+fn what_is_suggested_makes_the_solid_that_was_meant() {
+    for (text, wrong, expected) in [
+        (
+            "solid s = opSubtraction(sphere(0.5), box())",
+            "opSubtraction(sphere(0.5), box())",
+            "box() \\ sphere(0.5)",
+        ),
+        (
+            "solid s = any k in 1..4 by 0.5: ball([k, k^2, 0], 0.3)",
+            "any k in 1..4 by 0.5: ball([k, k^2, 0], 0.3)",
+            "any k in 0..6: ball([1 + 0.5*k, (1 + 0.5*k)^2, 0], 0.3)",
+        ),
+        (
+            "solid s = any k in 5..0 step -1: ball([k, 0, 0], 0.3)",
+            "any k in 5..0 step -1: ball([k, 0, 0], 0.3)",
+            "any k in 0..5: ball([5 - k, 0, 0], 0.3)",
+        ),
+        (
+            "solid s = box(center=[1, 2, 3], size=2)",
+            "box(center=[1, 2, 3], size=2)",
+            "box([0, 1, 2], [2, 3, 4])",
+        ),
+        (
+            "solid s = box(size=[1 cm, 2 cm, 3 cm], center=true)",
+            "box(size=[1 cm, 2 cm, 3 cm], center=true)",
+            "box([-0.5 cm, -1 cm, -1.5 cm], [0.5 cm, 1 cm, 1.5 cm])",
+        ),
+        (
+            "solid s = cylinder(h=3, r1=0, r2=1)",
+            "cylinder(h=3, r1=0, r2=1)",
+            "cone(1, 3).mirror([0, 0, 1]).move([0, 0, 3])",
+        ),
+        (
+            "let c = [1, 2, 3]\nlet d = [1, 1, 1]\nsolid s = box(center=c, size=d)",
+            "box(center=c, size=d)",
+            "box(c - d/2, c + d/2)",
+        ),
+        ("let parts = [sphere(1), box()]\nsolid s = parts", "parts", "any part in parts: part"),
+        (
+            "param n = 6\nsolid s = any k in 1..n step 2: ball([k, 0, 0], 0.3)",
+            "any k in 1..n step 2: ball([k, 0, 0], 0.3)",
+            "any k in 0..ceil((n - 1)/2): ball([1 + 2*k, 0, 0], 0.3)",
+        ),
+        (
+            "param r: 1 mm .. 5 mm\nsolid s = sphere(r)",
+            "param r: 1 mm .. 5 mm",
+            "param r = 1 mm in 1 mm .. 5 mm",
+        ),
+        (
+            "solid s = cylinder(h=3, d1=2 mm, d2=1 mm)",
+            "cylinder(h=3, d1=2 mm, d2=1 mm)",
+            "cylinder(1 mm, 3).taper(3, 0.5)",
+        ),
+    ] {
+        let found = messages(text);
+        let help = found.list[0].help.clone().unwrap_or_default();
+        assert_eq!(told(&help)[0], expected, "{found}");
+        let (before, after) = text.rsplit_once(wrong).unwrap();
+        let mended = format!("{before}{expected}{after}");
+        let mended = program(&mended).unwrap_or_else(|found| panic!("{mended}: {found}"));
+        assert!(!mended.warnings().has_errors());
+    }
+    let found = messages("solid s = sphere(p) \\ sphere(q) where p = 2, q = 1").to_string();
+    assert!(found.contains("write `let p = 2` and `let q = 1` above"), "{found}");
+}
+
+/// A body whose shape is written in the scene has no name of its own.
+#[test]
+fn a_force_on_a_shape_without_a_name() {
+    let scene = |force: &str| {
+        format!(
+            "scene s {{\n  box {{ max: [1, 1, 1] }}\n  fluid {{ shape: ball([0.5, 0.5, 0.5], 0.2) }}\n  \
+             container {{ solid: sphere(0.5).move([0.5, 0.5, 0.5]) }}\n  probe f {{ force: {force} }}\n}}"
+        )
+    };
+    let found = messages(&scene("vessel")).to_string();
+    assert!(found.contains("write `force: obstacle`, or define `solid vessel = …`"), "{found}");
+    assert!(program(&scene("obstacle")).is_ok());
+}
