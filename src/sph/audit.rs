@@ -284,7 +284,12 @@ impl Audit {
         let by_fall = mass * parameters.gravity.dot(sums.places - self.places);
         let by_gravity = by_fall + 0.5 * dt * (before + power);
         // the part of it that the velocities do not show yet
-        let to_come = if is_staggered { 0.5 * dt * power } else { 0.0 };
+        let to_come = match (is_staggered, self.is_moved) {
+            // what walls carry has the velocity of the middle of the step
+            (true, true) => 0.5 * (by_fall + dt * power),
+            (true, false) => 0.5 * dt * power,
+            (false, _) => 0.0,
+        };
         if by_walls.is_finite() {
             self.work += by_gravity + by_walls;
             self.by_walls += by_walls;

@@ -94,19 +94,19 @@ scene trap {{
 /// ring's momentum and 8 % of its energy of motion.)
 #[test]
 fn water_turns_along_a_round_wall_without_loss() {
-    let ring = ("x^2 + y^2 >= 0.04", 0.0, 0.5);
-    let bucket = ("z <= 0.2 + 36*(x^2 + y^2 - 0.08)/19.62", -9.81, 0.0137);
-    for ((shape, gravity, frames), method) in
+    let ring = ("x^2 + y^2 >= 0.04", 0.4, 0.0, 0.5);
+    let bucket = ("z <= 0.2 + 36*(x^2 + y^2 - 0.08)/19.62", 0.6, -9.81, 0.0137);
+    for ((shape, height, gravity, frames), method) in
         [ring, bucket].into_iter().flat_map(|scene| ["wcsph", "dfsph"].map(|method| (scene, method)))
     {
         let mut simulation = simulation(&format!(
             "rfm 1
-solid vessel = cylinder(0.4, 0.6)
+solid vessel = cylinder(0.4, {height})
 scene turning {{
-  box {{ min: [-0.45, -0.45, 0], max: [0.45, 0.45, 0.6] }}
+  box {{ min: [-0.45, -0.45, 0], max: [0.45, 0.45, {height}] }}
   container {{ solid: vessel }}
   fluid water {{
-    shape: vessel and z <= 0.4 and {shape}, spacing: 0.04, density: 1000, viscosity: 0, artificial_viscosity: 0,
+    shape: vessel and {shape}, spacing: 0.04, density: 1000, viscosity: 0, artificial_viscosity: 0,
     velocity: [-6*y, 6*x, 0]
   }}
   gravity: [0, 0, {gravity}]

@@ -10,7 +10,8 @@
 //!
 //! The pressure of the step to come is that of the last solve, at most its mean over the relaxation time: an impact that
 //! lasts a step is over, and in advance it would throw the fluid back. (With twice that of the last solve at most, a jet
-//! bounced off a plate and pushed it by 18 % too much.)
+//! bounced off a plate and pushed it by 18 % too much.) The first step gives nothing, because walls that begin to move
+//! strike the fluid in it.
 
 use glam::DVec3;
 

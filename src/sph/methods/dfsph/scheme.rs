@@ -59,6 +59,8 @@
 //!
 //! Invariant: the densities are those of the present positions.
 
+mod pressure;
+
 use glam::DMat3;
 use smallvec::{SmallVec, smallvec};
 
@@ -66,11 +68,11 @@ use super::super::{
     free_surface::FreeSurface,
     roughness::{self, Roughness},
     scheme::{Scheme, Start},
-    shifting::{depth, restore_crowding, save_crowding, shift},
+    shifting::{restore_crowding, save_crowding, shift},
     tension::Tension,
 };
 use super::ahead::Ahead;
-use super::passes::{Constants, Continuation, Densities, Drag, Field};
+use super::passes::{Constants, Continuation, Densities, Drag};
 use super::rigid::Rigid;
 use super::solver::{Begin, Errors, Goal, RateOf, Solver};
 use super::walls::Walls;
@@ -81,7 +83,7 @@ use crate::sph::{
     error::StepError,
     kernel::Wendland,
     params::Parameters,
-    particles::{Particles, Vectors, add_scaled},
+    particles::{Vectors, add_scaled},
     reaction::Reaction,
 };
 
@@ -179,7 +181,9 @@ impl Scheme for DivergenceFree {
         self.whole = Rigid::of(&core.particles.position, &core.particles.velocity);
         self.find_other_accelerations(core, dt);
         add_scaled(&mut core.particles.velocity, &core.acceleration, dt);
-        self.ahead.hold_back(core, dt);
+        if self.last_dt > 0.0 {
+            self.ahead.hold_back(core, dt);
+        }
         self.keep_density(core, dt);
         self.find_displacements(core, dt, OWED);
         core.move_obstacles(dt);
@@ -419,62 +423,11 @@ impl DivergenceFree {
         self.bear(core, dt, relaxation);
         // what is given in advance keeps densities to second order, of which a rate of density knows nothing
         self.drift.clone_from(&core.particles.velocity);
-        self.ahead.give(core, (&self.forces, &self.walls), dt);
+        if self.last_dt > 0.0 {
+            self.ahead.give(core, (&self.forces, &self.walls), dt);
+        }
         add_scaled(&mut core.acceleration, &self.ahead.push, 0.5);
         self.report_pressure(core, dt, relaxation);
-    }
-
-    /// Finds the pressures that the particles bear in this step and, averaged over the relaxation time, in several.
-    /// The lower of the two is given in advance.
-    fn bear(&mut self, core: &Core, dt: f64, relaxation: f64) {
-        let (s, density) = (&self.forces.s, &core.particles.density);
-        let scale = |(rho, g): (&f64, &f64)| (1.0 + depth(*g) * (g - 1.0)) * rho * rho;
-        let scales: Vec<f64> = density.iter().zip(&self.spread).map(scale).collect();
-        self.free.clear();
-        // what acted since the last solve, half of the last step and half of this one: the pressure that was given in
-        // advance, and this answer for all of this step
-        let [given, found] = [self.last_dt / (self.last_dt + dt), 2.0 * dt / (self.last_dt + dt)];
-        let now = |((s, ahead), scale): ((&f64, &f64), &f64)| (found * s + given * ahead) * scale;
-        self.free.extend(s.iter().zip(&self.ahead.s).zip(&scales).map(now));
-        let share = mean_share(core, dt, relaxation);
-        for (mean, now) in self.own_pressure.iter_mut().zip(&self.free) {
-            *mean += share * (now - *mean);
-        }
-        for ((((ahead, s), mean), now), scale) in self
-            .ahead
-            .s
-            .iter_mut()
-            .zip(&mut self.forces.s)
-            .zip(&self.own_pressure)
-            .zip(&self.free)
-            .zip(&scales)
-        {
-            let all = *s + 0.5 * *ahead;
-            *ahead = if *scale > 0.0 { mean.min(*now) / scale } else { 0.0 };
-            // the next solve begins with what is left to find
-            *s = (all - 0.5 * *ahead).max(0.0);
-        }
-    }
-
-    /// Finds the pressures around the particles, and averages the reported ones over at most the time in which a
-    /// particle moves by a spacing.
-    fn report_pressure(&mut self, core: &mut Core, dt: f64, relaxation: f64) {
-        let Constants { kernel, rest_density, .. } = Constants::of(&core.parameters);
-        self.field.resize(self.free.len(), 0.0);
-        // the displacements of this step are not known yet
-        let push = &mut self.displacement;
-        push.clone_from(&self.forces.push);
-        add_scaled(push, &self.ahead.push, 0.5);
-        let pass = Field { kernel, rest_density, push };
-        core.sum(&pass, [&self.free], [&mut self.field]);
-        let share = mean_share(core, dt, relaxation);
-        let spacing = core.parameters.spacing();
-        let Particles { position, velocity, pressure, .. } = &mut core.particles;
-        for (i, (mean, now)) in pressure.iter_mut().zip(&self.field).enumerate() {
-            let speed = (velocity.get(i) - self.whole.at(position.get(i))).length();
-            // the pressure that a particle bore a spacing ago belongs to another place
-            *mean += share.max((dt * speed / spacing).min(1.0)) * (now - *mean);
-        }
     }
 
     /// Finds the displacements of a step of the length dt: those by shifting, and those that keep densities
@@ -518,12 +471,6 @@ fn square_of_norm(matrix: &DMat3) -> f64 {
     let eighth = fourth * fourth;
     let entries = eighth.to_cols_array();
     entries.iter().map(|x| x * x).sum::<f64>().sqrt().powf(0.25)
-}
-
-/// The weight of a step's pressure in a mean over the relaxation time. Until that has passed, the mean is taken since
-/// the start.
-fn mean_share(core: &Core, dt: f64, relaxation: f64) -> f64 {
-    (dt / relaxation.min(core.time + dt)).min(1.0)
 }
 
 /// The time, s, in which a debt is paid back after a step of the length `dt` with the greatest speed `speed`.

@@ -1,0 +1,74 @@
+//! The pressures of a step: those that particles bear, and those around them that are reported.
+
+use super::super::super::shifting::depth;
+use super::super::passes::{Constants, Field};
+use super::DivergenceFree;
+use crate::sph::{
+    core::Core,
+    particles::{Particles, add_scaled},
+};
+
+impl DivergenceFree {
+    /// Finds the pressures that the particles bear in this step and, averaged over the relaxation time, in several.
+    /// The lower of the two is given in advance.
+    pub(super) fn bear(&mut self, core: &Core, dt: f64, relaxation: f64) {
+        let (s, density) = (&self.forces.s, &core.particles.density);
+        let scale = |(rho, g): (&f64, &f64)| (1.0 + depth(*g) * (g - 1.0)) * rho * rho;
+        let scales: Vec<f64> = density.iter().zip(&self.spread).map(scale).collect();
+        self.free.clear();
+        // what acted since the last solve, half of the last step and half of this one: the pressure that was given in
+        // advance, and this answer for all of this step
+        let [given, found] = match self.last_dt {
+            0.0 => [0.0, 1.0],
+            last_dt => [last_dt / (last_dt + dt), 2.0 * dt / (last_dt + dt)],
+        };
+        let now = |((s, ahead), scale): ((&f64, &f64), &f64)| (found * s + given * ahead) * scale;
+        self.free.extend(s.iter().zip(&self.ahead.s).zip(&scales).map(now));
+        let share = mean_share(core, dt, relaxation);
+        for (mean, now) in self.own_pressure.iter_mut().zip(&self.free) {
+            *mean += share * (now - *mean);
+        }
+        for ((((ahead, s), mean), now), scale) in self
+            .ahead
+            .s
+            .iter_mut()
+            .zip(&mut self.forces.s)
+            .zip(&self.own_pressure)
+            .zip(&self.free)
+            .zip(&scales)
+        {
+            let all = *s + 0.5 * *ahead;
+            let lasts = *scale > 0.0 && self.last_dt > 0.0;
+            *ahead = if lasts { mean.min(*now) / scale } else { 0.0 };
+            // the next solve begins with what is left to find
+            *s = (all - 0.5 * *ahead).max(0.0);
+        }
+    }
+
+    /// Finds the pressures around the particles, and averages the reported ones over at most the time in which a
+    /// particle moves by a spacing.
+    pub(super) fn report_pressure(&mut self, core: &mut Core, dt: f64, relaxation: f64) {
+        let Constants { kernel, rest_density, .. } = Constants::of(&core.parameters);
+        self.field.resize(self.free.len(), 0.0);
+        // the displacements of this step are not known yet
+        let push = &mut self.displacement;
+        push.clone_from(&self.forces.push);
+        add_scaled(push, &self.ahead.push, 0.5);
+        let pass = Field { kernel, rest_density, push };
+        core.sum(&pass, [&self.free], [&mut self.field]);
+        let share = mean_share(core, dt, relaxation);
+        let spacing = core.parameters.spacing();
+        let Particles { position, velocity, pressure, .. } = &mut core.particles;
+        for (i, (mean, now)) in pressure.iter_mut().zip(&self.field).enumerate() {
+            let speed = (velocity.get(i) - self.whole.at(position.get(i))).length();
+            // the pressure that a particle bore a spacing ago belongs to another place
+            *mean += share.max((dt * speed / spacing).min(1.0)) * (now - *mean);
+        }
+    }
+}
+
+/// The weight of a step's pressure in a mean over the relaxation time. Until that has passed, the mean is taken since
+/// the start.
+fn mean_share(core: &Core, dt: f64, relaxation: f64) -> f64 {
+    (dt / relaxation.min(core.time + dt)).min(1.0)
+}
