@@ -334,8 +334,8 @@ told). With `gradients: differences` the work of walls is known to a tenth, so a
 
 No fluid gains energy so: the method made it of its errors. What moves faster or higher than it could is wrong from then on. More particles, more `artificial_viscosity`
 (wcsph), or the other method may help; `energy_excess` in the summary has the largest value, and the probe `audit` shows when it
-arose. A run whose energy doubles stops; where walls move, if as much came from nowhere as there was at the start and as walls have
-given and taken since.";
+arose. A run whose energy doubles stops. Where walls move, it stops when what came from nowhere stays, for 64 steps, above the energy
+at the start and all that walls gave and took since.";
 VOLUME_CHANGED = "W0512":
 "The places of the particles take up 2 % more or less room than at the start. Where particles crowd, the fluid has lost
 volume: levels are too low and what hits them comes too late. `volume_change` in the summary has the largest value.";

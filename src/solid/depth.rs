@@ -56,7 +56,7 @@ impl Field for Depth<'_> {
 }
 
 impl Solid {
-    /// A field with the surface of [`Depth`] in a box, and its distances within `reach` of it: [`Depth`] itself
+    /// A field with the same surface as [`Depth`] in a box, and the same distances within `reach` of that surface: [`Depth`] itself
     /// for a few leaves, and for many a [`CellMap`], which asks only those that have a zero near a place. It is made for
     /// points that lie near the surface; elsewhere it costs as much as [`Depth`].
     pub fn depth(&self, over: Aabb, reach: f64) -> Box<dyn Field + '_> {

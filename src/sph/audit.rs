@@ -285,7 +285,7 @@ impl Audit {
         let by_gravity = by_fall + 0.5 * dt * (before + power);
         // the part of it that the velocities do not show yet
         let to_come = match (is_staggered, self.is_moved) {
-            // what walls carry has the velocity of the middle of the step
+            // the work of walls is that up to the middle of the step, and what they carry has moved to its end
             (true, true) => 0.5 * (by_fall + dt * power),
             (true, false) => 0.5 * dt * power,
             (false, _) => 0.0,

@@ -34,7 +34,10 @@ pub fn reach(graph: &Graph, root: Node) -> Option<Aabb> {
         return None;
     }
     let mut junctions = Junctions::of(&graph);
-    let found = junctions.above(root, false, 0.0);
+    let mut found = junctions.above(root, false, 0.0);
+    if !found.is_empty() && !has_ends(&found) {
+        found = found.intersection(&junctions.by_choices(root));
+    }
     (!found.is_empty() && has_ends(&found)).then_some(found)
 }
 
@@ -106,8 +109,6 @@ fn folded(graph: &Graph, root: Node) -> (Graph, Node) {
 struct Junctions<'g> {
     graph: &'g Graph,
     known: FxHashMap<(Node, bool, u64), Aabb>,
-    /// How many nodes may still be looked at choice by choice.
-    tries: usize,
 }
 
 /// A node that is to be above −depth, negated or not.
@@ -123,12 +124,10 @@ fn has_ends(found: &Aabb) -> bool {
     found.min.abs().max(found.max.abs()).max_element() < OF_USE
 }
 
-/// The most choices of parts that are looked at one by one, their terms, the nodes of all their graphs, and the nodes
-/// whose choices are looked at.
+/// The most choices of parts that are looked at one by one, their terms, and the nodes of all their graphs.
 const MOST_CHOICES: usize = 64;
 const MOST_TERMS: usize = 2000;
-const MOST_NODES_OF_CHOICES: usize = 100_000;
-const MOST_TRIES: usize = 16;
+const MOST_NODES_OF_CHOICES: usize = 1_000_000;
 
 /// If u ∨ v > −c, one of u and v is above −c times this, because u ∨ v is at most (2 − √2)·max(u, v) where
 /// both are negative.
@@ -136,7 +135,7 @@ const SHARE: f64 = 1.71;
 
 impl<'g> Junctions<'g> {
     fn of(graph: &'g Graph) -> Self {
-        Self { graph, known: FxHashMap::default(), tries: MOST_TRIES }
+        Self { graph, known: FxHashMap::default() }
     }
 
     /// A box around the points at which a node, negated or not, is above −`depth`, which is not negative.
@@ -148,12 +147,7 @@ impl<'g> Junctions<'g> {
         let found = match (SignRule::of(self.graph, node), negated) {
             (SignRule::All(u, v), false) | (SignRule::Any(u, v), true) => {
                 let both = self.above(u, negated, depth).intersection(&self.above(v, negated, depth));
-                let found = self.contracted(node, negated, depth, both);
-                if found.is_empty() || has_ends(&found) {
-                    found
-                } else {
-                    found.intersection(&self.by_choices(node, negated, depth))
-                }
+                self.contracted(node, negated, depth, both)
             }
             (SignRule::All(u, v), true) | (SignRule::Any(u, v), false) => {
                 let depth = SHARE * depth;
@@ -178,13 +172,11 @@ impl<'g> Junctions<'g> {
 
     /// The boxes of all choices of one part of each "any of", together: a wedge that ends at one of two planes has an
     /// end with each of them, and none with either.
-    fn by_choices(&mut self, node: Node, negated: bool, depth: f64) -> Aabb {
+    fn by_choices(&self, root: Node) -> Aabb {
         let everywhere = Aabb::new(DVec3::splat(-FARTHEST), DVec3::splat(FARTHEST));
         let is_short =
             |choices: &Vec<_>| choices.len() > 1 && choices.len() * self.graph.len() <= MOST_NODES_OF_CHOICES;
-        let choices = (self.tries > 0).then(|| self.choices(node, negated, depth)).flatten();
-        let Some(choices) = choices.filter(is_short) else { return everywhere };
-        self.tries -= 1;
+        let Some(choices) = self.choices(root, false, 0.0).filter(is_short) else { return everywhere };
         let mut graph = self.graph.clone();
         let mut hull = Aabb::EMPTY;
         for terms in choices {

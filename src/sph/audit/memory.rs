@@ -87,7 +87,7 @@ impl Audit {
             least,
             given,
             supplied,
-            ruinous_looks: ruinous_looks as u32,
+            ruinous_looks: (ruinous_looks as u32).min(u32::MAX - 1),
             allowed,
             gained,
             is_moved: self.is_moved,

@@ -24,14 +24,17 @@ use crate::sph::{
     reaction::Reaction,
 };
 
-/// Name of the pressure in a checkpoint.
+/// Names of the pressure and of the length of its step in a checkpoint.
 const PRESSURE: &str = "pressure ahead";
+const STEP: &str = "step ahead";
 
 /// What acts in advance.
 #[derive(Default)]
 pub(super) struct Ahead {
     /// p/ρ² of each particle, as in the solver of forces.
     pub s: Vec<f64>,
+    /// The length of the step of which it was half, s; zero before anything was given.
+    pub dt: f64,
     /// a(s), m/s².
     pub push: Vectors,
     /// The gravity of this step where it depends on the place, m/s²; empty if it does not.
@@ -43,7 +46,7 @@ impl Ahead {
     pub fn nothing(n: usize) -> Self {
         let mut push = Vectors::default();
         push.resize(n);
-        Self { s: vec![0.0; n], push, gravity: Vectors::default() }
+        Self { s: vec![0.0; n], dt: 0.0, push, gravity: Vectors::default() }
     }
 
     /// Adds a part of the gravity that depends on the place to the accelerations, as [`Core::pull`] does, and notes it.
@@ -54,9 +57,10 @@ impl Ahead {
         let uniform = core.parameters.gravity;
         self.gravity.clone_from(&core.acceleration);
         core.pull(part);
+        // steps differ in length, and half of this one waits
         let pulled = core.acceleration.components().into_iter().zip(self.gravity.components_mut());
         for ((now, before), uniform) in pulled.zip(uniform.to_array()) {
-            before.iter_mut().zip(now).for_each(|(before, now)| *before = now - *before + uniform);
+            before.iter_mut().zip(now).for_each(|(before, now)| *before = (now - *before) / part + uniform);
         }
     }
 
@@ -73,6 +77,7 @@ impl Ahead {
         }
         add_scaled(&mut core.particles.velocity, &self.push, 0.5 * dt);
         self.add_gravity(core, 0.5 * dt);
+        self.dt = dt;
     }
 
     fn add_gravity(&self, core: &mut Core, time: f64) {
@@ -90,6 +95,7 @@ impl Ahead {
     /// Saves what the next step needs.
     pub fn save(&self, checkpoint: &mut Checkpoint) {
         checkpoint.set(PRESSURE, self.s.clone());
+        checkpoint.set(STEP, vec![self.dt]);
     }
 
     /// Takes up what a checkpoint saved.
@@ -98,6 +104,10 @@ impl Ahead {
     /// The column that the checkpoint lacks.
     pub fn restore(&mut self, checkpoint: &Checkpoint) -> Result<(), CheckpointError> {
         self.s = checkpoint.of_particles(PRESSURE)?;
+        self.dt = match checkpoint.get(STEP)? {
+            [dt] if dt.is_finite() && *dt >= 0.0 => *dt,
+            _ => return Err(CheckpointError::Column(STEP.into())),
+        };
         Ok(())
     }
 

@@ -149,6 +149,7 @@ impl Declaration for Dfsph {
         "debt",
         "own pressure",
         "pressure ahead",
+        "step ahead",
         "stiffness",
         "last step",
         "crowding x",

@@ -18,10 +18,9 @@ impl DivergenceFree {
         self.free.clear();
         // what acted since the last solve, half of the last step and half of this one: the pressure that was given in
         // advance, and this answer for all of this step
-        let [given, found] = match self.last_dt {
-            0.0 => [0.0, 1.0],
-            last_dt => [last_dt / (last_dt + dt), 2.0 * dt / (last_dt + dt)],
-        };
+        let is_first = self.last_dt == 0.0;
+        let (given, all) = if is_first { (0.0, 2.0 * dt) } else { (self.ahead.dt, self.ahead.dt + dt) };
+        let [given, found] = [given / all, 2.0 * dt / all];
         let now = |((s, ahead), scale): ((&f64, &f64), &f64)| (found * s + given * ahead) * scale;
         self.free.extend(s.iter().zip(&self.ahead.s).zip(&scales).map(now));
         let share = mean_share(core, dt, relaxation);
@@ -37,11 +36,13 @@ impl DivergenceFree {
             .zip(&self.free)
             .zip(&scales)
         {
-            let all = *s + 0.5 * *ahead;
-            let lasts = *scale > 0.0 && self.last_dt > 0.0;
-            *ahead = if lasts { mean.min(*now) / scale } else { 0.0 };
-            // the next solve begins with what is left to find
-            *s = (all - 0.5 * *ahead).max(0.0);
+            if *scale <= 0.0 {
+                (*ahead, *s) = (0.0, 0.0);
+                continue;
+            }
+            *ahead = if is_first { 0.0 } else { mean.min(*now) / scale };
+            // the next solve begins with what it will find if nothing changes: half of gravity waits in it
+            *s = (now / scale - 0.5 * if is_first { now / scale } else { *ahead }).max(0.0);
         }
     }
 
