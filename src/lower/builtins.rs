@@ -348,11 +348,25 @@ impl Lowering<'_> {
         let at = self.user_span(origin.unwrap_or(span));
         let message = format!("{what} must be positive, found {number}");
         let diagnostic = Diagnostic::error(Code::OUT_OF_RANGE, at, message);
-        if number >= 0.0 || what != "the thickness of a shell" {
+        let is_negative = number < 0.0 && number.is_finite();
+        if !is_negative || what != "the thickness of a shell" {
             return self.fail(diagnostic);
         }
-        let written = self.written_at(at).and_then(|text| text.strip_prefix('-')).map(str::trim_start);
-        let width = written.map_or_else(|| (-number).to_string(), str::to_string);
+        // a formula has more signs than its first
+        let is_one = |text: &&str| {
+            let (number, unit) = text.split_once(' ').unwrap_or((text, ""));
+            number.starts_with(|c: char| c.is_ascii_digit() || c == '.')
+                && number.parse::<f64>().is_ok()
+                && unit.trim().chars().all(char::is_alphabetic)
+        };
+        let written = self.written_at(at).and_then(|text| text.strip_prefix('-')).map(str::trim);
+        let width = written.filter(is_one).map_or_else(
+            || {
+                let rounded = format!("{:.9e}", -number).parse().unwrap_or(-number);
+                rounded.to_string()
+            },
+            str::to_string,
+        );
         self.fail(diagnostic.help(format!(
             "a wall lies inside of the surface: write `.shell({width})`; for one outside of it, write \
              `.offset({width}).shell({width})`"

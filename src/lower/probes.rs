@@ -5,6 +5,7 @@
 use glam::DVec3;
 
 use super::lowering::Lowering;
+use super::names::Kind;
 use super::scene::declaration::{SceneKey, declare_keys, names};
 use super::scene::run::times_as_written;
 use super::scene::{AskedMean, Block, SceneProbe};
@@ -284,10 +285,21 @@ impl<'a> Lowering<'a> {
             let help = match known {
                 [] => "it has none".to_string(),
                 // the name of bodies whose solids are written in the scene
-                known if known.iter().any(unnamed) => format!(
-                    "a shape that is written in the scene is called `obstacle`: write `{key}: obstacle`, or define \
-                     `solid {name} = …` above the scene and write `solid: {name}`"
-                ),
+                known if known.iter().any(unnamed) => {
+                    let of_file = self.names.of(SourceId::File, name).map(|global| &global.kind);
+                    let named = match of_file {
+                        Some(Kind::Solid(_)) => format!(", or `solid: {name}` in place of that shape"),
+                        Some(_) => String::new(),
+                        None => {
+                            format!(
+                                ", or define `solid {name} = …` above the scene and write `solid: {name}`"
+                            )
+                        }
+                    };
+                    format!(
+                        "a shape that is written in the scene is called `obstacle`: write `{key}: obstacle`{named}"
+                    )
+                }
                 known => {
                     let known: Vec<String> = known.iter().map(|other| format!("`{other}`")).collect();
                     format!("it has {}", known.join(", "))

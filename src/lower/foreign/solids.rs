@@ -2,14 +2,14 @@
 
 use super::super::lowering::Lowering;
 use crate::diagnostic::{Code, Diagnostic};
-use crate::syntax::ast::{Argument, ExprKind, Name};
+use crate::syntax::ast::{Argument, Expr, ExprKind, Name};
 use crate::syntax::foreign;
 
 impl Lowering<'_> {
     /// The message for `box(center=[0, 0, 0], size=[1, 1, 1])` and `cylinder(h=2, r1=1, r2=0.5)`; `None` if the
     /// arguments are those of this language, or unknown.
     pub fn solid_of_other_tools(&self, function: &str, arguments: &[Argument]) -> Option<Diagnostic> {
-        let given = Given { lowering: self, arguments };
+        let mut given = Given { lowering: self, unread: arguments.iter().collect() };
         let (known, call): (&[&str], _) = match function {
             "box" => (&BOX, given.box_of_a_size()),
             "cylinder" | "cone" => (&CONE, given.truncated_cone()),
@@ -39,95 +39,150 @@ const BOX: [&str; 7] = ["center", "centre", "centered", "size", "sizes", "dimens
 /// What truncated cones are given elsewhere.
 const CONE: [&str; 4] = ["r1", "r2", "d1", "d2"];
 
-/// The arguments of a call.
+/// The arguments of a call. What is suggested in its place has read all of them: one that nobody asked for may
+/// change the solid.
 struct Given<'a, 'l> {
     lowering: &'a Lowering<'l>,
-    arguments: &'a [Argument],
+    unread: Vec<&'a Argument>,
 }
 
+const CENTRE: [&str; 3] = ["center", "centre", "centered"];
+const SIZE: [&str; 4] = ["size", "sizes", "dimensions", "extents"];
+
 impl<'a> Given<'a, '_> {
-    /// What was written for the first of these names.
-    fn named(&self, names: &[&str]) -> Option<&'a str> {
+    /// What was given for the first of these names, which counts as read.
+    fn named(&mut self, names: &[&str]) -> Option<&'a Expr> {
         let is_meant = |argument: &&Argument| {
             argument.name.as_ref().is_some_and(|name| names.contains(&name.text.as_str()))
         };
-        let argument = self.arguments.iter().find(is_meant)?;
-        self.lowering.written(&argument.value)
+        let at = self.unread.iter().position(is_meant)?;
+        Some(&self.unread.remove(at).value)
     }
 
-    /// The parts of a vector that was written for one of these names; a number stands for three of them.
-    fn vector(&self, names: &[&str]) -> Option<[&'a str; 3]> {
-        let is_meant = |argument: &&Argument| {
-            argument.name.as_ref().is_some_and(|name| names.contains(&name.text.as_str()))
-        };
-        let value = &self.arguments.iter().find(is_meant)?.value;
+    /// The first argument without a name, which counts as read.
+    fn unnamed(&mut self) -> Option<&'a Expr> {
+        let at = self.unread.iter().position(|argument| argument.name.is_none())?;
+        Some(&self.unread.remove(at).value)
+    }
+
+    fn written(&self, value: &Expr) -> Option<&'a str> {
+        self.lowering.written(value)
+    }
+
+    /// The three parts of a vector.
+    fn vector(&self, value: &Expr) -> Option<[&'a str; 3]> {
+        let ExprKind::Vector(parts) = &value.kind else { return None };
+        let [a, b, c] = &parts[..] else { return None };
+        Some([self.written(a)?, self.written(b)?, self.written(c)?])
+    }
+
+    /// The three sides of a box; a number stands for three of them.
+    fn sides(&self, value: &Expr) -> Option<[&'a str; 3]> {
         match &value.kind {
-            ExprKind::Vector(parts) => {
-                let [a, b, c] = &parts[..] else { return None };
-                Some([self.lowering.written(a)?, self.lowering.written(b)?, self.lowering.written(c)?])
-            }
-            ExprKind::Number(_) | ExprKind::Quantity { .. } => Some([self.lowering.written(value)?; 3]),
-            _ => None,
+            ExprKind::Number(_) | ExprKind::Quantity { .. } => Some([self.written(value)?; 3]),
+            _ => self.vector(value),
         }
     }
 
-    /// `box(center=[0, 0, 0], size=[1, 1, 1])`, and `box(size=[1, 1, 1], center=true)`
-    fn box_of_a_size(&self) -> Option<String> {
-        const CENTRE: [&str; 3] = ["center", "centre", "centered"];
-        const SIZE: [&str; 4] = ["size", "sizes", "dimensions", "extents"];
-        let size_text = self.named(&SIZE);
-        let size = if size_text.is_none() { Some(["1"; 3]) } else { self.vector(&SIZE) };
-        let centre = match self.named(&CENTRE) {
-            None | Some("false" | "False") => {
-                return Some(match size {
-                    Some([x, y, z]) => format!("box([0, 0, 0], [{x}, {y}, {z}])"),
-                    None => format!("box([0, 0, 0], {})", size_text?),
-                });
-            }
-            Some("true" | "True") => Some(["0"; 3]),
-            Some(_) => self.vector(&CENTRE),
-        };
-        if let (Some(centre), Some(size)) = (centre, size) {
-            let corner = |sign| {
-                let parts: Vec<String> =
-                    centre.iter().zip(&size).map(|(middle, side)| beside(middle, side, sign)).collect();
-                format!("[{}]", parts.join(", "))
-            };
-            return Some(format!("box({}, {})", corner(-1.0), corner(1.0)));
+    /// `box(center=[0, 0, 0], size=[1, 1, 1])`, `box(size=[1, 1, 1], center=true)` and `box([1, 1, 1], center=true)`
+    fn box_of_a_size(&mut self) -> Option<String> {
+        let centre = self.named(&CENTRE);
+        let size = self.named(&SIZE).or_else(|| centre.and_then(|_| self.unnamed()));
+        if !self.unread.is_empty() {
+            return None;
         }
-        let (c, s) = (foreign::operand(self.named(&CENTRE)?), foreign::operand(size_text?));
-        Some(format!("box({c} - {s}/2, {c} + {s}/2)"))
+        let sides = match size {
+            Some(size) => self.sides(size),
+            None => Some(["1"; 3]),
+        };
+        let is_name = |value: &Expr| matches!(value.kind, ExprKind::Name(_));
+        let middle = match (centre, centre.and_then(|centre| self.written(centre))) {
+            (None, _) | (_, Some("false" | "False")) => {
+                return match (sides, size) {
+                    (Some([x, y, z]), _) => Some(format!("box([0, 0, 0], [{x}, {y}, {z}])")),
+                    (None, Some(size)) if is_name(size) => {
+                        Some(format!("box([0, 0, 0], {})", self.written(size)?))
+                    }
+                    (None, _) => None,
+                };
+            }
+            (_, Some("true" | "True")) => ["0"; 3],
+            (Some(centre), Some(name)) if is_name(centre) => {
+                let size = size?;
+                let is_vector = is_name(size) || self.vector(size).is_some();
+                let side = foreign::operand(self.written(size)?);
+                return is_vector.then(|| format!("box({name} - {side}/2, {name} + {side}/2)"));
+            }
+            (Some(centre), _) => match (self.vector(centre), size) {
+                (Some(middle), _) if sides.is_some() => middle,
+                (Some(_), Some(size)) if is_name(size) => {
+                    let (middle, side) = (self.written(centre)?, self.written(size)?);
+                    return Some(format!("box({middle} - {side}/2, {middle} + {side}/2)"));
+                }
+                _ => return None,
+            },
+        };
+        let sides = sides?;
+        let corner = |sign| {
+            let parts: Vec<String> =
+                middle.iter().zip(&sides).map(|(middle, side)| beside(middle, side, sign)).collect();
+            format!("[{}]", parts.join(", "))
+        };
+        Some(format!("box({}, {})", corner(-1.0), corner(1.0)))
+    }
+
+    /// A radius, or half of a diameter.
+    fn radius(&mut self, r: &str, d: &str) -> Option<String> {
+        if let Some(radius) = self.named(&[r]) {
+            return self.written(radius).map(str::to_string);
+        }
+        let diameter = self.named(&[d])?;
+        Some(times(0.5, self.written(diameter)?))
     }
 
     /// `cylinder(h=2, r1=1, r2=0.5)`
-    fn truncated_cone(&self) -> Option<String> {
-        let radius = |r: &str, d: &str| {
-            let given = self.named(&[r]).map(str::to_string);
-            given.or_else(|| self.named(&[d]).map(|diameter| times(0.5, diameter)))
+    fn truncated_cone(&mut self) -> Option<String> {
+        let (low, high) = (self.radius("r1", "d1")?, self.radius("r2", "d2")?);
+        let h = match self.named(&["h", "height"]).or_else(|| self.unnamed()) {
+            Some(h) => self.written(h)?,
+            None => "1",
         };
-        let (low, high) = (radius("r1", "d1")?, radius("r2", "d2")?);
-        let first = self.arguments.first().filter(|argument| argument.name.is_none());
-        let first = first.and_then(|argument| self.lowering.written(&argument.value));
-        let h = self.named(&["h", "height"]).or(first).unwrap_or("1");
-        if low.parse() == Ok(0.0) {
-            return Some(format!("cone({high}, {h}).mirror([0, 0, 1]).move([0, 0, {h}])"));
+        let centred = match self.named(&CENTRE).map(|centre| self.written(centre)) {
+            None | Some(Some("false" | "False")) => false,
+            Some(Some("true" | "True")) => true,
+            Some(_) => return None,
+        };
+        let (bottom, top) = (amount(&low), amount(&high));
+        let is_negative = |radius: Option<(f64, &str)>| radius.is_some_and(|(radius, _)| radius < 0.0);
+        let is_point = |radius: Option<(f64, &str)>| radius.is_some_and(|(radius, _)| radius == 0.0);
+        if !self.unread.is_empty() || is_negative(bottom) || is_negative(top) {
+            return None;
         }
-        if high.parse() == Ok(0.0) {
-            return Some(format!("cone({low}, {h})"));
+        let lowered = if centred { format!(".move([0, 0, {}])", times(-0.5, h)) } else { String::new() };
+        match (is_point(bottom), is_point(top)) {
+            (true, true) => return None,
+            (true, false) => {
+                let raised = if centred { times(0.5, h) } else { h.to_string() };
+                return Some(format!("cone({high}, {h}).mirror([0, 0, 1]).move([0, 0, {raised}])"));
+            }
+            (false, true) => return Some(format!("cone({low}, {h}){lowered}")),
+            (false, false) => {}
         }
-        let top = match (amount(&low), amount(&high)) {
+        let ratio = match (bottom, top) {
             (Some((low, unit)), Some((high, other))) if unit == other => shown(high / low),
             _ => format!("({high})/({low})"),
         };
-        Some(format!("cylinder({low}, {h}).taper({h}, {top})"))
+        Some(format!("cylinder({low}, {h}).taper({h}, {ratio}){lowered}"))
     }
 }
 
 /// A number and its unit, which is empty if there is none.
 fn amount(text: &str) -> Option<(f64, &str)> {
     let (number, unit) = text.trim().split_once(' ').unwrap_or((text.trim(), ""));
-    let unit = unit.trim();
-    unit.chars().all(char::is_alphabetic).then_some((number.parse().ok()?, unit))
+    let (value, unit): (f64, _) = (number.parse().ok()?, unit.trim());
+    // names like `inf` are no numbers here
+    let is_number = value.is_finite() && number.ends_with(|c: char| c.is_ascii_digit() || c == '.');
+    (is_number && unit.chars().all(char::is_alphabetic)).then_some((value, unit))
 }
 
 /// A number with its unit behind it.

@@ -146,10 +146,16 @@ impl Slip<'_> {
     /// `param r: float = 1`
     fn type_of_a_param(&self) -> Option<Diagnostic> {
         let head = self.on_its_line().trim();
-        let (_, value) = self.after().lines().next()?.split_once('=')?;
+        let (kind, value) = self.after().lines().next()?.split_once('=')?;
         let (item, name) = head.split_once(' ')?;
         let is_head = ["param", "let", "solid"].contains(&item) && last_word(name) == name.trim();
-        (is_head && fits(&[name, value])).then(|| {
+        // the `=` may belong to a comparison or to an argument
+        let kind = kind.trim();
+        let is_type = !kind.is_empty()
+            && last_word(kind) == kind
+            && !matches!(kind, "x" | "y" | "z")
+            && !value.starts_with('=');
+        (is_head && is_type && fits(&[name, value])).then(|| {
             self.unexpected().help(format!("values have no types: write `{head} = {}`", value.trim()))
         })
     }

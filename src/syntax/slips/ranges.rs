@@ -2,7 +2,7 @@
 
 use super::super::foreign;
 use super::heads::FOLDS;
-use super::{Slip, bracketed, first_part, fits, last_part, last_word, parts};
+use super::{Slip, bracketed, first_part, fits, last_part, last_word, parts, words};
 use crate::diagnostic::Diagnostic;
 
 impl Slip<'_> {
@@ -15,8 +15,7 @@ impl Slip<'_> {
     /// `param r = 1 [0.1, 5]`
     pub(super) fn range_in_brackets(&self) -> Option<Diagnostic> {
         let param = self.on_its_line().trim();
-        let (inner, _) = self.after().lines().next()?.split_once(']')?;
-        self.range_of(param, inner)
+        self.range_of(param, self.text[self.at..].lines().next()?)
     }
 
     /// `param r = 1 in [0.5, 2]` and `param r = 1 in (0.5, 2)`
@@ -28,21 +27,20 @@ impl Slip<'_> {
             _ => return None,
         };
         let (param, range) = line.trim().split_once(" in ")?;
-        let inner = range.trim_start().strip_prefix(['[', '('])?;
-        let (inner, _) = inner.split_once([']', ')'])?;
-        self.range_of(param, inner)
+        self.range_of(param, range.trim_start())
     }
 
-    /// The message for a range that was written as two numbers in brackets.
-    fn range_of(&self, param: &str, inner: &str) -> Option<Diagnostic> {
-        let (low, high) = inner.split_once([',', ';'])?;
-        (param.starts_with("param ") && param.contains('=') && fits(&[param, inner])).then(|| {
+    /// The message for a range that was written as two numbers in brackets, with which a text begins.
+    fn range_of(&self, param: &str, range: &str) -> Option<Diagnostic> {
+        let ([low, high], rest) = two_bounds(range)?;
+        let ends = rest.is_empty() || rest.starts_with(['"', '#']);
+        let (_, value) = param.split_once('=')?;
+        (param.starts_with("param ") && ends && fits(&[param, low, high])).then(|| {
             // the bounds have the unit of the value
-            let value = param.rsplit_once('=').map_or("", |(_, value)| value.trim());
-            let unit = value.split_once(' ').map_or("", |(_, unit)| unit);
-            let [low, high] = [low, high].map(|bound| match bound.trim().parse::<f64>() {
-                Ok(_) => format!("{} {unit}", bound.trim()).trim_end().to_string(),
-                Err(_) => bound.trim().to_string(),
+            let unit = unit_of(value.trim());
+            let [low, high] = [low, high].map(|bound| match bound.parse::<f64>() {
+                Ok(_) => format!("{bound} {unit}").trim_end().to_string(),
+                Err(_) => bound.to_string(),
             });
             let message = match self.found {
                 "" => self.syntax("a range has no brackets"),
@@ -59,8 +57,12 @@ impl Slip<'_> {
         let value = line.split(['"', '#']).next()?.trim();
         let (item, name) = head.split_once(' ')?;
         let is_head = ["param", "let", "solid"].contains(&item) && last_word(name) == name.trim();
-        if !is_head || self.in_braces() || !fits(&[head, value]) {
+        if !is_head || self.in_braces() || !fits(&[head, value]) || has_equals(value) {
             return None;
+        }
+        if TYPES.contains(&value) {
+            let example = if item == "solid" { "sphere(1)" } else { "1" };
+            return Some(self.unexpected().help(format!("values have no types: write `{head} = {example}`")));
         }
         let (range, value) = match value.split_once("..") {
             Some((low, _)) if item == "param" && !value.contains(" in ") => {
@@ -107,11 +109,12 @@ impl Slip<'_> {
         }
         let rest = self.after().lines().next().unwrap_or_default().trim_start();
         let bounds = match rest.strip_prefix(['[', '(']) {
-            Some(inner) => inner.split([']', ')']).next().and_then(|inner| inner.split_once(',')),
+            Some(_) => two_bounds(rest).map(|([low, high], _)| (low, high)),
             None => first_part(rest).split_once(".."),
         };
+        let of_a_choice = words(value).any(|word| matches!(word, "if" | "then" | "else"));
         let written = match bounds {
-            Some((low, high)) if fits(&[low.trim(), value, high.trim()]) => {
+            Some((low, high)) if !of_a_choice && fits(&[low.trim(), value, high.trim()]) => {
                 format!("{} <= {value} <= {}", low.trim(), high.trim())
             }
             _ if self.found == "in" => return None,
@@ -190,6 +193,54 @@ impl Slip<'_> {
     }
 }
 
+/// What stands for the type of a number elsewhere.
+const TYPES: [&str; 9] = ["float", "int", "number", "real", "f64", "f32", "length", "double", "bool"];
+
+/// The two parts of brackets with which a text begins, and what stands behind them.
+fn two_bounds(text: &str) -> Option<([&str; 2], &str)> {
+    let inner = text.strip_prefix(['[', '('])?;
+    let (mut depth, mut start, mut found) = (0, 0, Vec::new());
+    for (at, c) in inner.char_indices() {
+        match c {
+            '(' | '[' => depth += 1,
+            ')' | ']' if depth == 0 => {
+                found.push(inner[start..at].trim());
+                return Some((found.try_into().ok()?, inner[at + 1..].trim()));
+            }
+            ')' | ']' => depth -= 1,
+            ',' | ';' if depth == 0 => {
+                found.push(inner[start..at].trim());
+                start = at + 1;
+            }
+            _ => {}
+        }
+    }
+    None
+}
+
+/// The unit of a value that is one number with a unit; empty for every other value.
+fn unit_of(value: &str) -> &str {
+    let (number, unit) = value.split_once(' ').unwrap_or((value, ""));
+    let unit = unit.trim();
+    let is_unit = unit.starts_with(char::is_alphabetic)
+        && unit.chars().all(|c| c.is_alphanumeric() || matches!(c, '/' | '^' | '²' | '³'));
+    if is_unit && number.parse::<f64>().is_ok() { unit } else { "" }
+}
+
+/// Whether a text has a `=` outside of brackets that belongs to no comparison.
+fn has_equals(text: &str) -> bool {
+    let mut depth = 0;
+    text.char_indices().any(|(at, c)| {
+        match c {
+            '(' | '[' => depth += 1,
+            ')' | ']' => depth -= 1,
+            _ => {}
+        }
+        let compares = text[..at].ends_with(['<', '>', '=', '!']) || text[at..].starts_with("==");
+        c == '=' && depth == 0 && !compares
+    })
+}
+
 /// The value of a step: `2*k`, `1 + 2*k` or `5 - k`.
 fn multiple(start: &str, step: &str, variable: &str) -> String {
     let (sign, step) = match step.strip_prefix('-') {
@@ -208,7 +259,8 @@ fn multiple(start: &str, step: &str, variable: &str) -> String {
     }
 }
 
-/// A formula with a value in place of a name: in brackets, unless it stands alone between commas or brackets.
+/// A formula with a value in place of a name: in brackets, unless it stands alone between commas or brackets. The
+/// name of an argument stays.
 fn replaced(formula: &str, name: &str, value: &str) -> String {
     let is_part = |c: char| c.is_alphanumeric() || c == '_';
     let mut written = String::new();
@@ -216,9 +268,13 @@ fn replaced(formula: &str, name: &str, value: &str) -> String {
     while let Some(at) = rest.find(name) {
         let (before, behind) = (&rest[..at], &rest[at + name.len()..]);
         written += before;
-        let is_name = !written.ends_with(|c: char| is_part(c) || c == '.') && !behind.starts_with(is_part);
+        let next = behind.trim_start();
+        let names_an_argument = next.starts_with('=') && !next.starts_with("==");
+        let is_name = !written.ends_with(|c: char| is_part(c) || c == '.')
+            && !behind.starts_with(is_part)
+            && !names_an_argument;
         let is_alone = |text: &str| text.is_empty() || text.ends_with(['(', '[', ',']);
-        let ends = behind.trim_start().is_empty() || behind.trim_start().starts_with([')', ']', ',']);
+        let ends = next.is_empty() || next.starts_with([')', ']', ',']);
         match (is_name, is_alone(written.trim_end()) && ends) {
             (false, _) => written += name,
             (true, true) => written += value,
@@ -237,5 +293,6 @@ mod tests {
     fn names_are_replaced_where_they_stand_alone() {
         assert_eq!(replaced("ball([k, 0, k^2], kr).k", "k", "2*k"), "ball([2*k, 0, (2*k)^2], kr).k");
         assert_eq!(replaced("k", "k", "5 - k"), "5 - k");
+        assert_eq!(replaced("f(k=1, r = k)", "k", "2*k"), "f(k=1, r = (2*k))");
     }
 }

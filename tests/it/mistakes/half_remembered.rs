@@ -39,6 +39,30 @@ const TEXTS: &[&str] = &[
     "solid s = cylinder(h=3, d1=2 mm, d2=1 mm)",
     "solid s = cylinder(h=3, r1=0, r2=1)",
     "solid s = cylinder(h=3, r1=1, r2=0)",
+    // what was not understood in full leads to no text of its own
+    "solid s = box([1, 2, 3], center=true)",
+    "solid s = box(2, center=true)",
+    "solid s = box(1, 2, 3, center=true)",
+    "solid s = box(min=[1, 1, 1], size=[2, 2, 2])",
+    "let d = [1, 2, 3]\nsolid s = box(size=d, center=true)",
+    "solid s = cylinder(h=2, r1=1, r2=0.5, center=true)",
+    "solid s = cylinder(h=2 cm, r1=0, r2=1 cm, center=true)",
+    "solid s = cylinder(h=2, r1=1, r2=0.5, segments=32)",
+    "solid s = cylinder(h=3 mm, r1=0 mm, r2=1 mm)",
+    "solid s = cylinder(h=3 mm, r1=1 mm, r2=0 mm)",
+    "solid s = sphere(1).shell(-0.1 - 0.2)",
+    "solid s = sphere(1).shell(0/0)",
+    "solid s = if z in [0, 1] then sphere(1) else box()",
+    "solid s = sphere(3) and z in [min(0, 1), 2]",
+    "param r = 2 in [max(1, 2), 3]\nsolid s = sphere(r)",
+    "param r = 2 [max(1, 2), 3]\nsolid s = sphere(r)",
+    "param r = 2 in [1, 2, 3]\nsolid s = sphere(r)",
+    "solid s: x^2 <= 1",
+    "solid s: sphere(r=2)",
+    "param r: float = 1\nsolid s = sphere(r)",
+    "param r: float\nsolid s = sphere(r)",
+    "let i = 1\nparam r = 2 * i in [0.5, 2]\nsolid s = sphere(r)",
+    "solid s = any r in 0..5 step 2: sphere(r=0.1).move([r, 0, 0])",
 ];
 
 #[test]
@@ -126,4 +150,8 @@ fn a_force_on_a_shape_without_a_name() {
     let found = messages(&scene("vessel")).to_string();
     assert!(found.contains("write `force: obstacle`, or define `solid vessel = …`"), "{found}");
     assert!(program(&scene("obstacle")).is_ok());
+    // a solid that is there is not defined again
+    let found = messages(&format!("solid post = sphere(0.1)\n{}", scene("post"))).to_string();
+    assert!(found.contains("write `force: obstacle`, or `solid: post` in place"), "{found}");
+    assert!(!found.contains("define `solid post"), "{found}");
 }
