@@ -42,7 +42,7 @@ pub(super) struct Ahead {
 }
 
 impl Ahead {
-    /// Nothing for n particles.
+    /// Without any pressure yet, for `n` particles.
     pub fn nothing(n: usize) -> Self {
         let mut push = Vectors::default();
         push.resize(n);
