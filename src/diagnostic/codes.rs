@@ -338,7 +338,8 @@ arose. A run whose energy doubles stops. Where walls move, it stops when what ca
 at the start and all that walls gave and took since.";
 VOLUME_CHANGED = "W0512":
 "The places of the particles take up 2 % more or less room than at the start. Where particles crowd, the fluid has lost
-volume: levels are too low and what hits them comes too late. `volume_change` in the summary has the largest value.";
+volume: levels are too low and what hits them comes too late. `volume_change` in the summary has the largest value. With `wcsph` a
+higher `sound_speed` helps where pressures are higher than was foreseen, as in a thick fluid that is pressed through a narrow place.";
 COMPRESSED = "W0513":
 "By the places of its particles the fluid is compressed, on average, more than ten times as much as the method is to allow.
 Look at `compression_p99` in the summary as well: large values mean that particles crowd in a few places, most often at
@@ -372,7 +373,7 @@ SLOW_SOUND = "W0520":
 "`sound_speed` is stated, and the fluid may become faster than a fifth of it. A weakly compressible fluid changes its density
 by about the square of its speed over that of sound: 1 % at a tenth, 5 % at more than a fifth. Beyond, it is a gas, and what is
 found is not that of a liquid. Left out, the speed of sound is ten times the greatest expected speed u, or with surface tension σ
-ten times √(u² + σ/ρa), with the spacing a.";
+ten times √(u² + σ/ρa), with the spacing a, or in a creeping flow 10√(10νu/a).";
 NOTHING_COMPARED = "W0521":
 "`from` in the block `truth` says from when on its solution holds, and the run ends before. So there is no frame at which the
 flow is compared with it.";

@@ -25,12 +25,13 @@ pub struct Contacts {
     drags: Vec<(usize, DVec3)>,
 }
 
-/// A change of a particle's velocity by an obstacle.
+/// A change of a particle's velocity by an obstacle, m/s, and of its angular momentum per mass by a couple, m²/s.
 #[derive(Debug, Clone, Copy)]
 struct Hit {
     particle: usize,
     obstacle: usize,
     change: DVec3,
+    turn: DVec3,
     at: DVec3,
 }
 
@@ -50,11 +51,12 @@ impl Contacts {
         self.for_forces
     }
 
-    /// Notes that an obstacle changed the velocity of a particle at a place, if a probe asks for forces.
-    pub fn add(&self, particle: usize, obstacle: usize, change: DVec3, at: DVec3) {
+    /// Notes that an obstacle changed the velocity of a particle at a place, m/s, and by a couple its angular momentum
+    /// per mass, m²/s, if a probe asks for forces.
+    pub fn add(&self, particle: usize, obstacle: usize, [change, turn]: [DVec3; 2], at: DVec3) {
         if self.for_forces {
             let mut now = self.now.lock().unwrap_or_else(PoisonError::into_inner);
-            now.push(Hit { particle, obstacle, change, at });
+            now.push(Hit { particle, obstacle, change, turn, at });
         }
     }
 
@@ -83,7 +85,7 @@ impl Contacts {
         now.sort_by_key(|hit| hit.particle); // stable: the hits of one particle stay in their order
         for hit in now.drain(..) {
             let impulse = -mass * hit.change;
-            let moment = hit.at.cross(impulse);
+            let moment = hit.at.cross(impulse) - mass * hit.turn;
             let total = &mut self.totals[hit.obstacle];
             for (sum, x) in total.iter_mut().zip(impulse.to_array().into_iter().chain(moment.to_array())) {
                 *sum += x;

@@ -81,7 +81,7 @@ impl Core {
         let mut acceleration = Vectors::default();
         acceleration.resize(particles.len());
         let speed = longest(&particles.velocity);
-        let wall = parameters.method.numerics().wall(&parameters.scales());
+        let wall = wall_of(&parameters);
         let contacts = boundary.any_moves().then(|| Contacts::of(boundary.obstacles.len()));
         let clear = if boundary.obstacles.is_empty() { Vec::new() } else { vec![UNKNOWN; particles.len()] };
         Self {
@@ -113,7 +113,7 @@ impl Core {
     /// Multiplies the mass of all particles by a factor. The walls follow their spacing.
     pub fn scale_masses(&mut self, factor: f64) {
         self.parameters.particle_mass *= factor;
-        self.wall = self.parameters.method.numerics().wall(&self.parameters.scales());
+        self.wall = wall_of(&self.parameters);
     }
 
     /// Moves the obstacles to the coming step.
@@ -507,6 +507,12 @@ fn all_finite(values: &[f64]) -> bool {
         zeros.iter().chain(rest).all(|x| x.is_finite())
     };
     values.par_chunks(CHUNK).all(is_finite)
+}
+
+/// How walls enter the sums of the method, for a fluid that rubs on itself as its viscosity asks for.
+fn wall_of(parameters: &Parameters) -> Wall {
+    let (numerics, scales) = (parameters.method.numerics(), parameters.scales());
+    Wall { viscous_forces: numerics.viscous_forces(&scales), ..numerics.wall(&scales) }
 }
 
 #[cfg(test)]

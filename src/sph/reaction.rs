@@ -67,7 +67,8 @@ impl<'a> Reaction<'a> {
         let work = |obstacle: usize, share: Share| {
             self.dt
                 * (share.by_pressure.dot(boundary.wall_velocity(obstacle, at))
-                    + share.by_friction.dot(boundary.velocity_along(obstacle, at)))
+                    + share.by_friction.dot(boundary.velocity_along(obstacle, at))
+                    + work_of_couple(share, || boundary.turning(obstacle, at, wall.h)))
         };
         let force: Option<fn(Share) -> DVec3> = match self.forces {
             Noted::Nothing => None,
@@ -78,7 +79,7 @@ impl<'a> Reaction<'a> {
         if let Some(force) = force {
             return boundary.divide(wall, at, &pushed, |obstacle, share| {
                 self.contacts.add_work(i, work(obstacle, share));
-                self.contacts.add(i, obstacle, self.dt * force(share), at);
+                self.contacts.add(i, obstacle, [self.dt * force(share), self.dt * share.couple], at);
             });
         }
         let (moving, is_alone) = match boundary.moving_near(at, wall.h) {
@@ -94,4 +95,9 @@ impl<'a> Reaction<'a> {
             self.contacts.add_work(i, f64::from(TURNS) * (exactly - roughly));
         }
     }
+}
+
+/// The power of a couple on a fluid, W/kg, beside a wall that turns, 1/s.
+fn work_of_couple(share: Share, turning: impl Fn() -> DVec3) -> f64 {
+    if share.couple == DVec3::ZERO { 0.0 } else { share.couple.dot(turning()) }
 }

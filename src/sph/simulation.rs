@@ -46,6 +46,9 @@ const AUDIT: &str = "audit";
 /// has the mass of its shape.
 const MASS: &str = "particle mass";
 
+/// Name of whether the fluid fills its vessel, 1 or 0, in a checkpoint.
+const FILLS_VESSEL: &str = "fills its vessel";
+
 impl Simulation {
     /// Checks the input and finds the densities and forces of the first instant.
     ///
@@ -109,6 +112,9 @@ impl Simulation {
         if let Ok([mass]) = checkpoint.get(MASS) {
             parameters.particle_mass = *mass;
         }
+        if let Ok([fills_vessel]) = checkpoint.get(FILLS_VESSEL) {
+            parameters.fills_vessel = *fills_vessel != 0.0;
+        }
         let particles = checkpoint.particles().map_err(SetupError::Checkpoint)?;
         // the particles of a checkpoint are sorted already: sorting them again leaves their order
         let instant = Some((checkpoint.steps, checkpoint.time));
@@ -127,6 +133,7 @@ impl Simulation {
         self.scheme.save(&mut checkpoint);
         checkpoint.set(AUDIT, self.audit.memory());
         checkpoint.set(MASS, vec![self.core.parameters.particle_mass]);
+        checkpoint.set(FILLS_VESSEL, vec![f64::from(u8::from(self.core.parameters.fills_vessel))]);
         checkpoint
     }
 

@@ -185,7 +185,7 @@ fn vortices_keep_their_shape_and_decay() {
 fn a_turning_cylinder_takes_the_fluid_along() {
     // eight spacings across the gap, and both walls cut the lattice; with slip at the walls all of it would
     // stay at rest and deviate by 1
-    velocity_within("couette", &[("particles", 2413.0)], 0.03);
+    velocity_within("couette", &[("particles", 2413.0)], 0.015);
 }
 
 #[test]
@@ -203,8 +203,8 @@ fn friction_holds_back_a_turning_cylinder() {
     let depth = 4.0 * (4.0 * std::f64::consts::PI * 0.75 / 942.0).sqrt();
     let known = -4.0 * std::f64::consts::PI * 100.0 * 2.0 * 0.25 / 0.75 * depth;
     println!("torque {torque}, known {known}");
-    // the velocity is 5 % off; the slope of the velocity at the wall gave 2.7 % too little
-    assert!((torque / known - 1.0).abs() < 0.022, "{torque} {known}");
+    // too large by 3.6 %, and by 1.2 and 0.5 % with ten and twenty spacings across
+    assert!((torque / known - 1.0).abs() < 0.045, "{torque} {known}");
 }
 
 /// Velocities in a cavity below a lid at the Reynolds number 100, from the tables of Ghia, Ghia and Shin (1982): x, z,
@@ -370,7 +370,7 @@ fn water_leaves_a_tank_with_the_speed_of_a_fall() {
 #[test]
 fn a_channel_that_closes_on_itself_has_its_profile() {
     // eight spacings across; twenty deviate by 1.6 %
-    velocity_within("poiseuille", &[("particles", 2413.0)], 0.05);
+    velocity_within("poiseuille", &[("particles", 2413.0)], 0.03);
 }
 
 /// A block of water flies into the corner of a plate and a floor, along which it slides or at which it

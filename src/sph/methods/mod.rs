@@ -25,6 +25,7 @@ mod declaration;
 mod dfsph;
 mod free_bodies;
 mod free_surface;
+mod near_walls;
 mod negative_pressure;
 mod numerics;
 mod paper;
@@ -34,6 +35,7 @@ mod scheme;
 mod shifting;
 mod start;
 mod tension;
+mod viscosity;
 mod wcsph;
 
 pub use declaration::{FluidDefaults, KeyBlock, KeyInfo, KeyReader, MethodInfo, Support};

@@ -4,7 +4,7 @@ use std::f64::consts::PI;
 
 use crate::sph::error::ParameterError;
 use crate::sph::scales::Scales;
-use crate::sph::walls::{Wall, WallKernel};
+use crate::sph::walls::{ViscousForces, Wall, WallKernel};
 
 /// Part of the support radius that a particle and a sound wave together may cross in one step. The value is
 /// customary for weakly compressible fluids, and cautious for the paper's. A drop of 3000 particles on the
@@ -15,6 +15,10 @@ pub(in crate::sph) const COURANT: f64 = 0.25;
 /// Factor of √(h/a) in the limit for an acceleration a: a particle that is accelerated from rest moves 1/32
 /// of h in such a step.
 const FORCE_FACTOR: f64 = 0.25;
+
+/// A fluid's viscosity counts from this part of the one on that damps noise. Water on the scale of a laboratory has
+/// less than a hundredth of it.
+const NOTICEABLE: f64 = 0.1;
 
 /// A speed of sound that is stated instead of derived.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -42,6 +46,17 @@ pub(in crate::sph) trait Numerics: Sync {
     /// The kinematic viscosity, m²/s, that damps the noise of particles, or would damp it by default: αhc/20
     /// of an artificial viscosity. Without it rows of particles resist a shear about as much.
     fn numerical_viscosity(&self, scales: &Scales) -> f64;
+
+    /// How the fluid rubs on itself: by the more exact forces where its viscosity counts beside that which damps
+    /// noise.
+    fn viscous_forces(&self, scales: &Scales) -> ViscousForces {
+        let own = scales.viscosity / scales.rest_density;
+        if own > NOTICEABLE * self.numerical_viscosity(scales) {
+            ViscousForces::WithSpin
+        } else {
+            ViscousForces::AlongLines
+        }
+    }
 
     /// Whether the drag of a body that moves through the fluid comes out several times too large, as it does
     /// with pressures in pairs.

@@ -34,7 +34,7 @@ use super::{
     contact::{Trouble, rubbed},
     coverage::Coverage,
     friction::Friction,
-    layers::Wall,
+    layers::{ViscousForces, Wall},
     volume::{ChangingShape, Known, Mapped, Maps, RigidPart},
 };
 
@@ -60,6 +60,9 @@ const LEVEL: f64 = 1e-6;
 
 /// The distance, over the support radius, of a face behind which all of a kernel lies.
 const BEYOND_REACH: f64 = 2.0;
+
+/// A step by which the slope of a wall's velocity is found, over the support radius.
+const TURNING_STEP: f64 = 1e-2;
 
 /// Part of a proven radius that is used. The rest allows for the rounding of many subtractions.
 const SURELY: f64 = 1.0 - 1e-9;
@@ -389,11 +392,25 @@ impl Boundary {
         if let Some(velocity) = motion {
             coverage.set_in_motion(velocity);
         }
-        let stated = obstacle.surface_velocity.as_ref().map(|velocity| velocity(p, self.time));
-        if let Some(velocity) = stated.or(motion) {
-            coverage.friction.take_along(velocity);
+        if !F::IS_NONE {
+            let stated = obstacle.surface_velocity.as_ref().map(|velocity| velocity(p, self.time));
+            if let Some(velocity) = stated.or(motion) {
+                let turning = match wall.viscous_forces {
+                    ViscousForces::AlongLines => DVec3::ZERO,
+                    ViscousForces::WithSpin => self.turning(k, p, wall.h),
+                };
+                coverage.friction.take_along(velocity, turning);
+            }
         }
         coverage
+    }
+
+    /// By how much an obstacle's surface turns near a place: half the curl of its velocity, 1/s.
+    pub fn turning(&self, k: usize, p: DVec3, h: f64) -> DVec3 {
+        let step = TURNING_STEP * h;
+        let velocity = self.velocity_along(k, p);
+        let slope = |axis: DVec3| (self.velocity_along(k, p + step * axis) - velocity) / step;
+        0.5 * DVec3::AXES.into_iter().map(|axis| axis.cross(slope(axis))).sum::<DVec3>()
     }
 
     fn collide_block(&self, block: &mut Block<'_>, contacts: Option<&Contacts>) -> Result<(), Fault> {
@@ -426,7 +443,7 @@ impl Boundary {
             }
             let hit = |obstacle, change: DVec3, wall: DVec3, at| {
                 if let Some(contacts) = contacts {
-                    contacts.add(block.first + k, obstacle, change, at);
+                    contacts.add(block.first + k, obstacle, [change, DVec3::ZERO], at);
                     contacts.add_work(block.first + k, change.dot(wall));
                 }
             };

@@ -77,7 +77,8 @@ impl<F: Friction, B: Behind> Coverage<F, B> {
             return Self::default();
         }
         let curvature = (face.mean_curvature * h).clamp(-MOST_CURVED, MOST_CURVED);
-        let OfFace { part, area, spread, filled, barrier, barrier_area } = wall.of_face(delta, curvature);
+        let taken = wall.of_face(delta, curvature);
+        let OfFace { part, area, spread, filled, barrier, barrier_area } = taken;
         Self {
             part,
             filled,
@@ -85,7 +86,7 @@ impl<F: Friction, B: Behind> Coverage<F, B> {
             spread: spread * Symmetric::square(face.normal),
             sweep: 0.0,
             barrier: Barrier { part: barrier, gradient: -barrier_area / h * face.normal, sweep: 0.0 },
-            friction: F::of_face(face, area / h, h),
+            friction: F::of_face(wall, face, &taken),
             behind: B::of_face(part, face.normal),
         }
     }
@@ -340,7 +341,7 @@ fn arcsine(x: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::sph::walls::{WallDrag, WallKernel};
+    use crate::sph::walls::{ViscousForces, WallDrag, WallKernel};
 
     type Coverage = super::Coverage<WallDrag, Carried>;
 
@@ -352,6 +353,7 @@ mod tests {
         spacing: 1.0 / 2.6,
         at_rest: 0.0,
         lattice_over_layers: 1.0,
+        viscous_forces: ViscousForces::AlongLines,
     };
 
     fn face(distance: f64, normal: DVec3) -> Part {

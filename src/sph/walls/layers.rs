@@ -11,6 +11,17 @@
 
 use super::kernel::WallKernel;
 
+/// How a viscous fluid rubs on itself.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub(in crate::sph) enum ViscousForces {
+    /// Along the lines between particles.
+    #[default]
+    AlongLines,
+    /// Against all relative motion but the turning of each neighbourhood: more exact, by one more sum over
+    /// neighbours.
+    WithSpin,
+}
+
 /// How walls enter the sums of a method.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(in crate::sph) struct Wall {
@@ -27,6 +38,8 @@ pub(in crate::sph) struct Wall {
     /// layers are planes and a lattice is points. With 2.2 spacings per support radius it is 0.975, with 3 it
     /// is 0.997, and at most 1 is counted.
     pub lattice_over_layers: f64,
+    /// How the fluid rubs on itself, which its friction at the wall must match.
+    pub viscous_forces: ViscousForces,
 }
 
 /// What one face takes of a kernel.
@@ -71,7 +84,15 @@ impl Wall {
     /// A continuous wall, for a fluid with this spacing, m.
     pub fn new(kernel: WallKernel, h: f64, spacing: f64) -> Self {
         let spacing = spacing / h;
-        let mut wall = Self { kernel, h, layer: None, spacing, at_rest: 0.0, lattice_over_layers: 1.0 };
+        let mut wall = Self {
+            kernel,
+            h,
+            layer: None,
+            spacing,
+            at_rest: 0.0,
+            lattice_over_layers: 1.0,
+            viscous_forces: ViscousForces::default(),
+        };
         // wide kernels know no difference between planes and points
         if spacing * LONGEST_SUM > 1.0 {
             let layers = wall.by_layers(0.5 * spacing);

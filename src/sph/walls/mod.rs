@@ -37,7 +37,7 @@ pub use contact::{Contact, Undefined, bounce, first_contact, push_out};
 pub(super) use coverage::{Coverage, inverse_above};
 pub(super) use friction::{Friction, WallDrag};
 pub use kernel::WallKernel;
-pub(super) use layers::Wall;
+pub(super) use layers::{ViscousForces, Wall};
 pub(super) use motion::StepLimits;
 pub(super) use shares::{NearMotion, Pushed, Share};
 pub(super) use symmetric::Symmetric;

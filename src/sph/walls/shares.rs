@@ -41,6 +41,10 @@ pub(in crate::sph) struct Pushed {
     /// without friction.
     pub velocity: DVec3,
     pub viscosity: f64,
+    /// How the fluid turns around the particle, 1/s, and the couple that walls exert on it by friction, m²/s²; zero
+    /// if its viscous forces act along lines.
+    pub spin: DVec3,
+    pub couple: DVec3,
 }
 
 impl Pushed {
@@ -51,17 +55,18 @@ impl Pushed {
     }
 }
 
-/// The part of one obstacle in that, m/s².
+/// The part of one obstacle in that, m/s² and m²/s².
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub(in crate::sph) struct Share {
     pub by_pressure: DVec3,
     pub by_friction: DVec3,
+    pub couple: DVec3,
 }
 
 impl From<Pushed> for Share {
     /// All of it.
-    fn from(Pushed { by_pressure, by_friction, .. }: Pushed) -> Self {
-        Self { by_pressure, by_friction }
+    fn from(Pushed { by_pressure, by_friction, couple, .. }: Pushed) -> Self {
+        Self { by_pressure, by_friction, couple }
     }
 }
 
@@ -138,8 +143,11 @@ impl Boundary {
         }
         let alone: SmallVec<[f64; 4]> = near.iter().map(|near| near.part).collect();
         let in_corner = self.press_in_corners(wall, p, &mut near);
-        let rubbed: SmallVec<[DVec3; 4]> =
-            near.iter().zip(&alone).map(|(near, alone)| near.part / alone * near.rub(pushed)).collect();
+        let rubbed: SmallVec<[[DVec3; 2]; 4]> = near
+            .iter()
+            .zip(&alone)
+            .map(|(near, alone)| [near.rub(pushed), near.couple(pushed)].map(|rub| near.part / alone * rub))
+            .collect();
         // that of strongly bent faces, and of thin walls, may have no share to give along their normals
         for near in near.iter_mut().filter(|near| !is_positive_definite(&near.moment)) {
             near.moment = near.part * DMat3::IDENTITY;
@@ -153,12 +161,12 @@ impl Boundary {
         let pressed = |near: &Near| factor * near.gradient + near.moment * completed;
         let left = solved(sum(share, |_| true), by_pressure - near.iter().map(pressed).sum::<DVec3>());
         let rubs = near.iter().any(|near| near.sticks && near.part > 0.0);
-        let bent = by_friction - rubbed.iter().sum::<DVec3>();
+        let bent = by_friction - rubbed.iter().map(|[rub, _]| *rub).sum::<DVec3>();
         let bent = if rubs { solved(sum(Near::along, |near| near.sticks), bent) } else { DVec3::ZERO };
-        for (near, rubbed) in near.iter().zip(rubbed) {
+        for (near, [rubbed, couple]) in near.iter().zip(rubbed) {
             let Some(obstacle) = near.obstacle else { continue };
             let by_friction = if near.sticks { rubbed + near.along() * bent } else { DVec3::ZERO };
-            tell(obstacle, Share { by_pressure: pressed(near) + share(near) * left, by_friction });
+            tell(obstacle, Share { by_pressure: pressed(near) + share(near) * left, by_friction, couple });
         }
     }
 
@@ -409,6 +417,11 @@ impl Near {
     /// The acceleration by its friction, m/s², were it alone and the velocity of the fluid not bent.
     fn rub(&self, Pushed { velocity, viscosity, .. }: &Pushed) -> DVec3 {
         self.friction.rub(*velocity, *viscosity)
+    }
+
+    /// The couple that it exerts by friction, m²/s², were it alone.
+    fn couple(&self, Pushed { velocity, viscosity, spin, .. }: &Pushed) -> DVec3 {
+        self.friction.couple(*velocity, *spin, *viscosity)
     }
 
     /// λ·(n⊗n), and a little in all directions.

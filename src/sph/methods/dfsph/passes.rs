@@ -13,7 +13,7 @@ use crate::sph::{
     walls::{Friction, Pushed},
 };
 
-use super::super::free_surface::FreeSurface;
+use super::super::{free_surface::FreeSurface, viscosity::SpinSums};
 use super::walls::{Walls, WallsNear};
 
 /// Constants that the passes share.
@@ -243,7 +243,7 @@ impl PairPass<3, 1, 1> for Squeeze<'_> {
 
 /// Finds the acceleration by viscosity and by gravity, and the smooth velocity around each particle.
 /// Viscosity is laminar (Monaghan & Gingold 1983), artificial (Monaghan 1992, for rough motion alone) or
-/// both; both act along the lines between particles.
+/// both. Both act along the lines between particles, unless the laminar one has been found with the spin.
 #[derive(Clone, Copy)]
 pub(super) struct Drag<'a, const LAMINAR: bool, const ARTIFICIAL: bool> {
     pub constants: Constants,
@@ -254,6 +254,11 @@ pub(super) struct Drag<'a, const LAMINAR: bool, const ARTIFICIAL: bool> {
     /// The factor α·h/2·c of the artificial viscosity, m²/s.
     pub artificial: f64,
     pub gravity: DVec3,
+    /// Viscous forces that replace those along lines.
+    pub spin: Option<SpinSums<'a>>,
+    /// G of each particle, by which viscous forces are divided in a fluid that fills its vessel. Its particles are
+    /// lighter than the room that they have, because packing them leaves gaps.
+    pub spread: Option<&'a [f64]>,
     /// Receives the forces of walls, if they are wanted.
     pub reaction: Option<Reaction<'a>>,
 }
@@ -278,7 +283,7 @@ impl<const LAMINAR: bool, const ARTIFICIAL: bool> PairPass<6, 10, 6> for Drag<'_
         let arriving = approach(0);
         // a particle has no line to itself
         let r2 = r2 + V::Element::of(LEAST_DISTANCE * self.constants.kernel.h.powi(2));
-        if LAMINAR {
+        if LAMINAR && self.spin.is_none() {
             let push = f * arriving / r2;
             for k in 0..3 {
                 sums[k] = push.mul_add(d[k], sums[k]);
@@ -302,17 +307,26 @@ impl<const LAMINAR: bool, const ARTIFICIAL: bool> PairPass<6, 10, 6> for Drag<'_
     fn finish(&self, i: usize, [x, y, z, dx, dy, dz, sx, sy, sz, weights]: [f64; 10]) -> [f64; 6] {
         let Constants { mass_steepness, rest_density, .. } = self.constants;
         let factor = mass_steepness / rest_density;
-        let mut drag = 10.0 * self.kinematic * factor * DVec3::new(x, y, z);
+        let mut drag = match self.spin {
+            Some(sums) => sums.drag(i, self.kinematic),
+            None => 10.0 * self.kinematic * factor * DVec3::new(x, y, z),
+        };
+        let share = self.spread.map_or(1.0, |spread| {
+            let spread = spread[i];
+            1.0 + depth(spread) * (1.0 / spread - 1.0)
+        });
         if LAMINAR && let Some((wall, _)) = self.walls.near(i) {
             let velocity = self.velocity.get(i);
             if let Some(reaction) = &self.reaction {
-                let by_friction = wall.friction.by_walls(drag, velocity, self.kinematic);
-                let viscosity = self.kinematic;
-                reaction.add(i, Pushed { by_friction, velocity, viscosity, ..Pushed::default() });
+                let by_friction = share * wall.friction.by_walls(drag, velocity, self.kinematic);
+                let viscosity = share * self.kinematic;
+                let pushed = Pushed { by_friction, velocity, viscosity, ..Pushed::default() };
+                let turned = self.spin.map(|sums| sums.with_couple(i, &wall.friction, pushed));
+                reaction.add(i, turned.unwrap_or(pushed));
             }
             drag = wall.friction.complete(drag, velocity, self.kinematic);
         }
-        let a = drag + self.artificial * factor * DVec3::new(dx, dy, dz) + self.gravity;
+        let a = share * drag + self.artificial * factor * DVec3::new(dx, dy, dz) + self.gravity;
         let smooth = if ARTIFICIAL { DVec3::new(sx, sy, sz) / weights } else { DVec3::ZERO };
         [a.x, a.y, a.z, smooth.x, smooth.y, smooth.z]
     }

@@ -70,6 +70,7 @@ use super::super::{
     scheme::{Scheme, Start},
     shifting::{restore_crowding, save_crowding, shift},
     tension::Tension,
+    viscosity::SpinViscosity,
 };
 use super::ahead::Ahead;
 use super::passes::{Constants, Continuation, Densities, Drag};
@@ -146,6 +147,7 @@ pub struct DivergenceFree {
     /// Pressures around the particles in this step, Pa.
     field: Vec<f64>,
     tension: Tension,
+    viscosity: SpinViscosity,
     roughness: Roughness,
     /// Displacements of this step that are not part of the velocity, m.
     pub(super) displacement: Vectors,
@@ -234,6 +236,7 @@ impl Scheme for DivergenceFree {
             + self.forces.bytes()
             + self.places.bytes()
             + self.tension.bytes()
+            + self.viscosity.bytes()
             + self.roughness.bytes()
             + self.walls.bytes()
             + self.ahead.bytes()
@@ -273,6 +276,7 @@ impl DivergenceFree {
             free: Vec::new(),
             field: Vec::new(),
             tension: Tension::default(),
+            viscosity: SpinViscosity::default(),
             roughness: Roughness::of(&core.particles.velocity, true),
             displacement: Vectors::default(),
             drift: Vectors::default(),
@@ -301,7 +305,7 @@ impl DivergenceFree {
     fn pressure_dt(&self, core: &Core) -> f64 {
         let rest = core.parameters.rest_density;
         let in_the_depth = self.own_pressure.iter().copied().fold(0.0, f64::max);
-        let at_walls = self.walls.found().iter().map(|(i, _, completion)| {
+        let at_walls = self.walls.found().iter().map(|(i, (_, completion))| {
             STIFFER_AT_WALLS * square_of_norm(completion) * self.own_pressure[*i as usize]
         });
         let greatest = at_walls.fold(in_the_depth, f64::max) / rest;
@@ -349,6 +353,8 @@ impl DivergenceFree {
             let fields = [&velocity.x[..], &velocity.y, &velocity.z, &rough.x, &rough.y, &rough.z];
             let out = [&mut x[..], y, z, &mut smooth.x, &mut smooth.y, &mut smooth.z];
             let (walls, reaction) = (&self.walls, Reaction::of(core, dt));
+            let spin = self.viscosity.find(core, velocity, |i| walls.near(i).map(|(wall, _)| wall.friction));
+            let spread = parameters.fills_vessel.then_some(&self.spread[..]);
             macro_rules! drag {
                 ($laminar:literal, $artificial:literal) => {{
                     let pass = Drag::<$laminar, $artificial> {
@@ -358,6 +364,8 @@ impl DivergenceFree {
                         kinematic,
                         artificial,
                         gravity: g,
+                        spin,
+                        spread,
                         reaction,
                     };
                     core.sum(&pass, fields, out);

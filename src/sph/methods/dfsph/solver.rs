@@ -275,7 +275,7 @@ impl Solver {
         rest_density: f64,
         (push, s): (&Vectors, &[f64]),
     ) {
-        walls.found().par_iter().with_min_len(CHUNK / 4).for_each(|(i, wall, completion)| {
+        walls.found().par_iter().with_min_len(CHUNK / 4).for_each(|(i, (wall, completion))| {
             let i = *i as usize;
             let (push, factor) = (push.get(i), -2.0 * rest_density * s[i]);
             let of_pairs = completion.inverse() * push - factor * wall.gradient;

@@ -6,9 +6,11 @@ use glam::DVec3;
 use super::super::{
     crowding::Crowding,
     free_surface::FreeSurface,
+    near_walls::NearWalls,
     negative_pressure::NegativePressure,
     roughness,
     shifting::{depth, falling_rate, return_rate},
+    viscosity::SpinSums,
 };
 use super::Gradients;
 use super::linear::{Held, Linear};
@@ -20,7 +22,7 @@ use crate::sph::{
     params::Parameters,
     particles::Vectors,
     reaction::Reaction,
-    walls::{Friction, Pushed, Symmetric, WallDrag},
+    walls::{Coverage, Friction, Pushed, Symmetric, WallDrag},
 };
 
 /// Squares of distances below this part of h² do not count as a direction.
@@ -88,6 +90,8 @@ pub(super) struct Rates<'a> {
     lattice: f64,
     /// The mean density by places to which densities return, over the rest density.
     pub mean_filled: f64,
+    /// Viscous forces that replace those along lines, with the walls near particles.
+    pub spin: Option<(SpinSums<'a>, &'a NearWalls<Coverage<WallDrag>>)>,
     /// Receives the forces of walls, if they are wanted.
     reaction: Option<Reaction<'a>>,
 }
@@ -130,6 +134,7 @@ impl<'a> Rates<'a> {
             missing,
             lattice: Wendland::lattice_sum(parameters.support_radius / parameters.spacing()),
             mean_filled: 1.0,
+            spin: None,
             reaction: Reaction::of(core, dt),
         }
     }
@@ -193,7 +198,7 @@ impl<const LAMINAR: bool, const ARTIFICIAL: bool, const EVEN: bool> Pairs<'_, LA
                 sums[13 + k] = weight.mul_add(other[k], sums[13 + k]);
             }
         }
-        if LAMINAR {
+        if LAMINAR && rates.spin.is_none() {
             // a particle has no line to itself
             let least = of(LEAST_DISTANCE * rates.kernel.h.powi(2));
             let rubbing = f * departing / (r2 + least);
@@ -225,12 +230,20 @@ impl<const LAMINAR: bool, const ARTIFICIAL: bool, const EVEN: bool> Pairs<'_, LA
         let mut push = steepness * DVec3::new(px, py, pz);
         let mut spread = steepness * squares / 3.0;
         let compression_by_pairs = -steepness * departing;
-        let mut drag = 10.0 * laminar * steepness * DVec3::new(ux, uy, uz);
-        let mut by_friction = DVec3::ZERO;
+        let mut drag = match rates.spin {
+            Some((sums, _)) => sums.drag(i, laminar),
+            None => 10.0 * laminar * steepness * DVec3::new(ux, uy, uz),
+        };
+        let (mut by_friction, mut friction) = (DVec3::ZERO, WallDrag::default());
         let velocity = rates.velocity.get(i);
         // a fluid without viscosity feels no friction, and most have none
         let wall = if LAMINAR {
-            rates.core.coverage::<WallDrag>(i).map(|wall| {
+            let near = match rates.spin {
+                Some((_, walls)) => walls.near(i).copied(),
+                None => rates.core.coverage::<WallDrag>(i),
+            };
+            near.map(|wall| {
+                friction = wall.friction;
                 by_friction = wall.friction.by_walls(drag, velocity, laminar);
                 drag = wall.friction.complete(drag, velocity, laminar);
                 wall.without_friction()
@@ -296,8 +309,10 @@ impl<const LAMINAR: bool, const ARTIFICIAL: bool, const EVEN: bool> Pairs<'_, LA
                     by_friction: mean * by_friction,
                     velocity,
                     viscosity: mean * laminar,
+                    ..Pushed::default()
                 };
-                reaction.add(i, pushed);
+                let turned = rates.spin.map(|(sums, _)| sums.with_couple(i, &friction, pushed));
+                reaction.add(i, turned.unwrap_or(pushed));
                 if LAMINAR {
                     reaction.note_drag(i, mean * drag);
                 }

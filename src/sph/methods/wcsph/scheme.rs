@@ -70,10 +70,12 @@ use smallvec::SmallVec;
 
 use super::super::{
     dfsph::spread,
+    near_walls::NearWalls,
     roughness::Roughness,
     scheme::{Scheme, Start},
     shifting::{Common, restore_crowding, save_crowding, shift},
     tension::Tension,
+    viscosity::SpinViscosity,
 };
 use super::numbers::{Numbers, at_rest, sums_crowding, tait};
 use super::passes::{Differences, Missing, Pairs, Rates, Shifted, closes_gaps};
@@ -83,6 +85,7 @@ use crate::sph::{
     core::Core,
     error::StepError,
     particles::{CHUNK, Vectors, add_scaled, set_sum},
+    walls::{Coverage, ViscousForces, WallDrag},
 };
 
 /// The scheme. It keeps the rates of change between steps; the rest is working memory.
@@ -117,6 +120,9 @@ pub struct Weakly {
     /// Working memory: the Q and the drift that a sum finds.
     found: [Vec<f64>; 2],
     tension: Tension,
+    viscosity: SpinViscosity,
+    /// The walls near particles, found for them.
+    walls: NearWalls<Coverage<WallDrag>>,
 }
 
 /// Names of the scheme's columns in a checkpoint.
@@ -191,6 +197,8 @@ impl Scheme for Weakly {
             + self.common.as_ref().map_or(0, Common::bytes)
             + self.tension.bytes()
             + self.roughness.bytes()
+            + self.viscosity.bytes()
+            + self.walls.bytes()
     }
 }
 
@@ -231,6 +239,8 @@ impl Weakly {
             roughness: Roughness::of(&core.particles.velocity, numbers.gradients == Gradients::Pairs),
             found: [vec![0.0; n], vec![0.0; n]],
             tension: Tension::default(),
+            viscosity: SpinViscosity::default(),
+            walls: NearWalls::default(),
         };
         core.sort(&mut scheme.roughness.columns());
         scheme.find_rates(core, 0.0);
@@ -313,6 +323,12 @@ impl Weakly {
         }
         let mut rates = Rates::new(core, numbers, &predicted, &pressure, &self.excess, &self.missing, dt);
         rates.mean_filled = self.mean_filled;
+        if core.wall().viscous_forces == ViscousForces::WithSpin {
+            self.walls.find(core, |i| core.coverage(i));
+        }
+        let walls = &self.walls;
+        let sums = self.viscosity.find(core, &predicted, |i| walls.near(i).map(|wall| wall.friction));
+        rates.spin = sums.map(|sums| (sums, walls));
         if numbers.gradients == Gradients::Differences {
             match (rates.laminar > 0.0, rates.artificial > 0.0) {
                 (true, true) => core.sum(&Differences::<true, true>(rates), fields, out),

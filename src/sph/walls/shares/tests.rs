@@ -177,6 +177,7 @@ fn shares_add_up_to_the_whole() {
         by_friction: DVec3::new(-1.0, 7.0, 2.0),
         velocity: DVec3::new(0.0, 3.0, -1.0),
         viscosity: 0.2,
+        ..Pushed::default()
     };
     let [left, right] = shares(&boundary(1.2), DVec3::new(0.5, 0.0, 2.0), pushed);
     assert!((left + right - pushed.by_pressure - pushed.by_friction).length() < 1e-9, "{left} {right}");
