@@ -1,10 +1,13 @@
 //! Meshes of compiled solids: vertices on the surface, normals, volumes, hidden parts.
 
+use std::f64::consts::PI;
+
 use rfm::field::{Closures, Field};
 use rfm::geom::Aabb;
 use rfm::glam::DVec3;
 use rfm::mesh::{
     Grid, Mesh, Quality, Resolution, Unwatched, check, dual_contouring, marching_cubes, measure, thin_cells,
+    volume,
 };
 use rfm::solid::Depth;
 use rfm::{Engine, Program, Solid};
@@ -165,4 +168,71 @@ fn depths_by_the_leaves_nearby_are_those_by_all() {
         "{worst} {tried} of {}",
         mesh.positions.len()
     );
+}
+
+/// Text, volume and area of shapes at several places and sizes.
+fn known_shapes() -> Vec<(String, f64, f64)> {
+    let mut shapes = Vec::new();
+    for (k, place) in ["", ".move([3, -2, 1])", ".rotate([1, 2, 3], 0.7)", ".rotate([0.3, -1, 0.4], 2.1)"]
+        .iter()
+        .enumerate()
+    {
+        let k = k as f64;
+        let mut add =
+            |text: String, volume: f64, area: f64| shapes.push((format!("({text}){place}"), volume, area));
+        for (outer, wall, long) in
+            [(6e-3, 2e-3, 0.1 + 0.05 * k), (0.5, 0.1, 1.0 + k), (20.0, 10.0, 5.0 + 9.0 * k)]
+        {
+            let inner = outer - wall;
+            let ends = PI * (outer * outer - inner * inner);
+            let text = format!(
+                "cylinder({outer}, {long}) \\ cylinder({inner}, {}).move([0, 0, {}])",
+                2.0 * long,
+                -0.5 * long
+            );
+            add(text, ends * long, 2.0 * PI * long * (outer + inner) + 2.0 * ends);
+        }
+        let (a, b, c) = (0.95 - 0.2 * k, 0.08 + 0.1 * k, 0.079);
+        add(format!("box([0, 0, 0], [{a}, {b}, {c}])"), a * b * c, 2.0 * (a * b + b * c + c * a));
+        let (r, h) = (0.4 + 0.1 * k, 0.9 - 0.15 * k);
+        add(format!("cone({r}, {h})"), PI * r * r * h / 3.0, PI * r * (r + r.hypot(h)));
+        add(format!("capsule({r}, {h})"), PI * r * r * (h + 4.0 / 3.0 * r), 2.0 * PI * r * (h + 2.0 * r));
+        add(format!("torus(1, {r})"), 2.0 * PI * PI * r * r, 4.0 * PI * PI * r);
+        // a hexagonal prism, and two balls apart from it
+        let text = format!(
+            "(all i in 0..6: half_space([1, 0, 0], [{r}, 0, 0]).rotate_z(i*60 deg)) and 0 <= z <= {h}"
+        );
+        let (side, base) = (12.0 * r * h / 3.0_f64.sqrt(), 12.0_f64.sqrt() * r * r);
+        add(text.clone(), base * h, 2.0 * base + side);
+        let balls = format!("({text}) or ball([3, 0, 0], {r}) or ball([0, 3, 0], {h})");
+        let (volume, area) = (4.0 / 3.0 * PI * (r.powi(3) + h.powi(3)), 4.0 * PI * (r * r + h * h));
+        add(balls, base * h + volume, 2.0 * base + side + area);
+        let inner = 0.9 - 0.05 * k;
+        add(
+            format!("sphere(1) \\ sphere({inner})"),
+            4.0 / 3.0 * PI * (1.0 - inner.powi(3)),
+            4.0 * PI * (1.0 + inner * inner),
+        );
+    }
+    shapes
+}
+
+#[test]
+fn volumes_and_areas_are_right_within_their_errors() {
+    let (mut area_errors, shapes) = (Vec::new(), known_shapes());
+    for (text, exact_volume, exact_area) in &shapes {
+        let solid = solid(&format!("rfm 1\nsolid s = {text}\n"), "s");
+        let bounds = solid.bounds().aabb().unwrap();
+        let surface = solid.surface(bounds.grown(0.1 * bounds.size().max_element()));
+        let found = volume(&*surface, &bounds, 96, &Unwatched).unwrap();
+        assert!(
+            (found.volume - exact_volume).abs() <= found.error,
+            "{text}: {found:?}, volume {exact_volume}"
+        );
+        assert!((found.area - exact_area).abs() <= found.area_error, "{text}: {found:?}, area {exact_area}");
+        area_errors.push(found.area_error / exact_area);
+    }
+    // errors that are always large would be right, too
+    area_errors.sort_by(f64::total_cmp);
+    assert!(area_errors[shapes.len() / 2] < 1e-3, "{area_errors:?}");
 }
