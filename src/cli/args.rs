@@ -251,11 +251,11 @@ pub(super) struct Mesh {
     #[arg(long, value_name = "ERROR", value_parser = tolerance, allow_negative_numbers = true)]
     pub simplify: Option<Tolerance>,
     /// Time to look for what the mesh misses, in seconds or with a unit [default: 10 s, or three times that of meshing
-    /// if it is longer]
+    /// if it is longer]. --quality has as much, and all that it needs unless this is stated
     #[arg(long, value_name = "TIME", value_parser = seconds)]
     pub budget: Option<f64>,
-    /// Measure the mesh against the surface and the surface against the mesh: takes longer than meshing, and --budget
-    /// does not end it
+    /// Measure the mesh against the surface and the surface against the mesh: takes longer than meshing. With --budget
+    /// it ends in time and says how much it has measured, unless --simplify needs all of it
     #[arg(long)]
     pub quality: bool,
     // the unit of the file's numbers; the help names those that there are

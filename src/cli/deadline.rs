@@ -2,6 +2,7 @@
 
 use std::time::{Duration, Instant};
 
+use super::progress::Progress;
 use rfm::mesh::Watch;
 
 /// Ends the work at an instant. What is found until then depends on the machine.
@@ -21,6 +22,19 @@ impl Deadline {
 impl Watch for Deadline {
     fn is_over(&self) -> bool {
         Instant::now() >= self.0
+    }
+}
+
+/// Work whose progress is shown, and that ends at a deadline if there is one.
+pub struct Shown<'a>(pub &'a Progress, pub Option<Deadline>);
+
+impl Watch for Shown<'_> {
+    fn progress(&self, done: f64) {
+        self.0.progress(done);
+    }
+
+    fn is_over(&self) -> bool {
+        self.1.is_some_and(|deadline| deadline.is_over())
     }
 }
 

@@ -60,6 +60,9 @@ pub struct Quality {
     pub mean_radius_ratio: f64,
     /// The share of the triangles whose radius ratio is below 0.1.
     pub slivers: f64,
+    /// The share of the samples that were measured both ways: 1, unless the watch ended the work. Then the largest
+    /// distances and angles are at least those found until then, and more triangles may be flipped.
+    pub measured: f64,
 }
 
 impl Quality {
@@ -73,7 +76,7 @@ impl Quality {
 /// Serialises as one flat object that begins with the Hausdorff distance.
 impl Serialize for Quality {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        let mut object = serializer.serialize_struct("Quality", 15)?;
+        let mut object = serializer.serialize_struct("Quality", 16)?;
         object.serialize_field("hausdorff", &self.hausdorff())?;
         object.serialize_field("mesh_to_surface_max", &self.to_surface.max)?;
         object.serialize_field("mesh_to_surface_rms", &self.to_surface.rms)?;
@@ -89,6 +92,7 @@ impl Serialize for Quality {
         object.serialize_field("min_radius_ratio", &self.min_radius_ratio)?;
         object.serialize_field("mean_radius_ratio", &self.mean_radius_ratio)?;
         object.serialize_field("slivers", &self.slivers)?;
+        object.serialize_field("measured", &self.measured)?;
         object.end()
     }
 }
@@ -124,7 +128,8 @@ impl<'a> Reference<'a> {
     /// parts of unlike scale would mislead it.
     ///
     /// # Errors
-    /// Those of [`dual_contouring`] in the finer grid that gives points of the surface.
+    /// Those of [`dual_contouring`] in the finer grid that gives points of the surface, also if the watch ends the work
+    /// on these points.
     pub fn new(
         field: &dyn Field,
         distance: &'a dyn Field,
@@ -135,16 +140,18 @@ impl<'a> Reference<'a> {
         let meshing = Stretch { watch, from: 0.0, to: MESHING };
         let finer = dual_contouring(field, finer.as_ref().unwrap_or(grid), &meshing)?;
         let moving = Stretch { watch, from: MESHING, to: 1.0 };
-        Ok(Self { distance, points: surface_points(&finer, distance, grid, &moving), extent: extent(&finer) })
+        let points = surface_points(&finer, distance, grid, &moving).ok_or(MeshError::Ended)?;
+        Ok(Self { distance, points, extent: extent(&finer) })
     }
 
     /// The distance of the point of the surface that is farthest from a mesh, in metres: no more than
     /// [`Quality::hausdorff`], and found in a small part of the time. For a mesh without triangles it is 0.
     pub fn least_distance(&self, mesh: &Mesh) -> f64 {
-        if mesh.triangles.is_empty() { 0.0 } else { surface_to_mesh(mesh, &self.points, &Unwatched).max }
+        if mesh.triangles.is_empty() { 0.0 } else { surface_to_mesh(mesh, &self.points, &Unwatched).0.max }
     }
 
-    /// Measures a mesh of the surface. For a mesh without triangles all distances are 0.
+    /// Measures a mesh of the surface. For a mesh without triangles all distances are 0. If the watch ends the work, the
+    /// samples taken until then count, see [`Quality::measured`].
     pub fn measure(&self, mesh: &Mesh, watch: &dyn Watch) -> Quality {
         let mut quality = shapes(mesh);
         if mesh.triangles.is_empty() {
@@ -153,8 +160,12 @@ impl<'a> Reference<'a> {
         let own = extent(mesh);
         quality.volume_error = own.0 / self.extent.0 - 1.0;
         quality.area_error = own.1 / self.extent.1 - 1.0;
-        mesh_to_surface(mesh, self.distance, &mut quality, &Stretch { watch, from: 0.0, to: THERE });
-        quality.from_surface = surface_to_mesh(mesh, &self.points, &Stretch { watch, from: THERE, to: 1.0 });
+        let (there, back) =
+            (Stretch { watch, from: 0.0, to: THERE }, Stretch { watch, from: THERE, to: 1.0 });
+        let measured_there = mesh_to_surface(mesh, self.distance, &mut quality, &there);
+        let (from_surface, measured_back) = surface_to_mesh(mesh, &self.points, &back);
+        quality.from_surface = from_surface;
+        quality.measured = measured_there.min(measured_back);
         quality
     }
 }
@@ -194,6 +205,7 @@ fn shapes(mesh: &Mesh) -> Quality {
         min_radius_ratio: shapes.iter().fold(1.0, |min, shape| min.min(shape.0)),
         mean_radius_ratio: shapes.iter().fold(0.0, |sum, shape| sum + shape.0) / count,
         slivers: shapes.iter().filter(|shape| shape.0 < 0.1).count() as f64 / count,
+        measured: 1.0,
         ..Quality::default()
     }
 }
@@ -253,13 +265,17 @@ fn spread([a, b, c]: [DVec3; 3]) -> impl Iterator<Item = DVec3> {
     std::iter::once((a + b + c) / 3.0).chain(lattice)
 }
 
-fn mesh_to_surface(mesh: &Mesh, field: &dyn Field, quality: &mut Quality, watch: &dyn Watch) {
+/// Measures from the mesh to the surface. Returns the share of the triangles that were measured.
+fn mesh_to_surface(mesh: &Mesh, field: &dyn Field, quality: &mut Quality, watch: &dyn Watch) -> f64 {
     let share = Share::of(mesh.triangles.len(), watch);
     let is_cap = |t: &[u32; 3]| t.iter().any(|v| mesh.caps.binary_search(v).is_ok());
     let parts: Vec<(Sums, Sums, usize)> = mesh
         .triangles
         .par_chunks(BATCH)
         .map(|triangles| {
+            if watch.is_over() {
+                return Default::default();
+            }
             let each_batch = triangles.len();
             let triangles: Vec<[DVec3; 3]> =
                 triangles.iter().filter(|t| !is_cap(t)).map(|&t| corners(mesh, t)).collect();
@@ -286,6 +302,7 @@ fn mesh_to_surface(mesh: &Mesh, field: &dyn Field, quality: &mut Quality, watch:
     quality.to_surface = Sums::join(parts.iter().map(|part| part.0));
     quality.normal_error = Sums::join(parts.iter().map(|part| part.1));
     quality.flipped = parts.iter().map(|part| part.2).sum();
+    share.part()
 }
 
 /// A point of the surface, with the outward unit normal that the distance has where the search began. That is
@@ -325,8 +342,9 @@ fn feet(field: &dyn Field, points: &[DVec3]) -> Vec<Foot> {
     feet
 }
 
-/// Points all over the surface and on its creases and corners, about half a cell apart, from a mesh of it.
-fn surface_points(mesh: &Mesh, distance: &dyn Field, grid: &Grid, watch: &dyn Watch) -> Vec<DVec3> {
+/// Points all over the surface and on its creases and corners, about half a cell apart, from a mesh of it; `None` if the
+/// work was ended before.
+fn surface_points(mesh: &Mesh, distance: &dyn Field, grid: &Grid, watch: &dyn Watch) -> Option<Vec<DVec3>> {
     let mut points = Vec::with_capacity(2 * mesh.positions.len());
     let caps: std::collections::HashSet<u32> = mesh.caps.iter().copied().collect();
     points.extend((0_u32..).zip(&mesh.positions).filter(|(v, _)| !caps.contains(v)).map(|(_, p)| *p));
@@ -337,18 +355,22 @@ fn surface_points(mesh: &Mesh, distance: &dyn Field, grid: &Grid, watch: &dyn Wa
         .map(|&t| corners(mesh, t).iter().sum::<DVec3>() / 3.0)
         .collect();
     let share = Share::of(middles.len(), watch);
-    let parts: Vec<Vec<Foot>> = middles
+    let parts: Option<Vec<Vec<Foot>>> = middles
         .par_chunks(BATCH)
         .map(|part| {
+            if watch.is_over() {
+                return None;
+            }
             let found = feet(distance, part);
             share.add(part.len());
-            found
+            Some(found)
         })
         .collect();
+    let parts = parts?;
     points.extend(parts.iter().flatten().map(|foot| foot.position));
     // a point that Newton's method lost says nothing
     points.retain(|p| p.is_finite() && grid.bounds().contains(*p));
-    points
+    Some(points)
 }
 
 /// How much of some work is done, for those who wait for it.
@@ -366,6 +388,11 @@ impl<'a> Share<'a> {
     fn add(&self, more: usize) {
         let done = self.done.fetch_add(more, Ordering::Relaxed) + more;
         self.watch.progress(done as f64 / self.all.max(1) as f64);
+    }
+
+    /// The part of the work that is done; all of it if there is none.
+    fn part(&self) -> f64 {
+        if self.all == 0 { 1.0 } else { self.done.load(Ordering::Relaxed) as f64 / self.all as f64 }
     }
 }
 
@@ -388,13 +415,17 @@ impl PointDistance for IndexedTriangle {
     }
 }
 
-fn surface_to_mesh(mesh: &Mesh, points: &[DVec3], watch: &dyn Watch) -> Distances {
+/// The distances of points of the surface from the mesh, and the share of the points that were measured.
+fn surface_to_mesh(mesh: &Mesh, points: &[DVec3], watch: &dyn Watch) -> (Distances, f64) {
     let share = Share::of(points.len(), watch);
     let index = RTree::bulk_load(mesh.triangles.iter().map(|&t| IndexedTriangle(corners(mesh, t))).collect());
     let parts: Vec<Sums> = points
         .par_chunks(BATCH)
         .map(|points| {
             let mut sums = Sums::default();
+            if watch.is_over() {
+                return sums;
+            }
             for p in points {
                 let nearest = index.nearest_neighbor(p.to_array());
                 sums.add(nearest.map_or(f64::INFINITY, |t| t.distance_2(&p.to_array()).sqrt()));
@@ -403,7 +434,7 @@ fn surface_to_mesh(mesh: &Mesh, points: &[DVec3], watch: &dyn Watch) -> Distance
             sums
         })
         .collect();
-    Sums::join(parts.into_iter())
+    (Sums::join(parts.into_iter()), share.part())
 }
 
 /// The point of a triangle nearest to `p`. It lies inside, on a side or in a corner.
@@ -524,6 +555,32 @@ mod tests {
         reference.measure(&mesh, &watch);
         let [there, back] = shares_around(THERE);
         assert!(there > 2 && back > 2, "{there} {back}");
+    }
+
+    /// Ends the work after it was asked so many times.
+    struct Patience(AtomicUsize);
+
+    impl Watch for Patience {
+        fn is_over(&self) -> bool {
+            self.0.fetch_update(Ordering::Relaxed, Ordering::Relaxed, |left| left.checked_sub(1)).is_err()
+        }
+    }
+
+    #[test]
+    fn a_watch_ends_the_measuring_with_what_was_found() {
+        let ball =
+            Closures { omega: |p: DVec3| 0.8 - p.length(), gradient: |p: DVec3| -p.normalize_or(DVec3::X) };
+        let grid = Grid::around(&Aabb::new(DVec3::NEG_ONE, DVec3::ONE), Resolution::Cells(16)).unwrap();
+        let mesh = marching_cubes(&ball, &grid, &Unwatched).unwrap();
+        let of = |asked| Patience(AtomicUsize::new(asked));
+        assert!(matches!(Reference::new(&ball, &ball, &grid, &of(0)), Err(MeshError::Ended)));
+        let reference = Reference::new(&ball, &ball, &grid, &Unwatched).unwrap();
+        let [none, some, all] = [0, 4, usize::MAX].map(|asked| reference.measure(&mesh, &of(asked)));
+        assert_eq!((none.measured, all.measured), (0.0, 1.0));
+        assert!(some.to_surface.samples > 0 && some.to_surface.samples < all.to_surface.samples);
+        assert!(some.to_surface.max <= all.to_surface.max);
+        // the shapes of the triangles need no samples
+        assert_eq!(none.min_angle, all.min_angle);
     }
 
     #[test]

@@ -133,6 +133,19 @@ fn quality_and_sharp_creases() {
 }
 
 #[test]
+fn a_budget_ends_the_measuring_of_quality_and_says_so() {
+    let quality = |budget: &str| {
+        let arguments = ["mesh", PAWN, "--cells", "24", "--quality", "--json", "--budget", budget];
+        let outcome = rfm(root(), &arguments).expect(0);
+        (outcome.json()["quality"]["measured"].as_f64(), outcome.stderr)
+    };
+    let (all, said) = quality("60 s");
+    assert!(all == Some(1.0) && !said.contains("quality"), "{all:?} {said}");
+    let (none, said) = quality("0");
+    assert!(none.is_none() && said.contains("the quality was not measured"), "{none:?} {said}");
+}
+
+#[test]
 fn odd_solids_are_meshed_or_refused() {
     let mesh = |text: &str, flags: &[&str]| {
         let arguments = [&["mesh", "-", "--cells", "20", "--json"], flags].concat();

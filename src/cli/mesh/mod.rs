@@ -11,7 +11,7 @@ use std::path::Path;
 use std::time::Instant;
 
 use super::args::{Mesh as Options, MeshMethod};
-use super::deadline::Deadline;
+use super::deadline::{self, Deadline};
 use super::failure::{Failure, complain, note};
 use super::shared::Shared;
 use super::{choose, input, output, progress};
@@ -272,16 +272,27 @@ fn measured(
 ) -> Result<(Option<Quality>, Option<Simplified>), Failure> {
     // the samples lie nearer to the surface than a cell
     let depth = solid.depth(*grid.bounds(), grid.spacing().max_element());
+    // a mesh that is simplified stays within its tolerance only if all of it is measured
+    let end = options.budget.filter(|_| options.simplify.is_none()).map(Deadline::after);
     let bar = progress::shares("a finer mesh");
-    let reference = Reference::new(surface, &*depth, grid, &bar);
+    let reference = Reference::new(surface, &*depth, grid, &deadline::Shown(&bar, end));
     bar.finish_and_clear();
-    let reference = reference.map_err(Failure::usage)?;
+    let reference = match reference {
+        Err(MeshError::Ended) => {
+            note(
+                "the quality was not measured: the finer mesh that this one is compared with was not finished in time; \
+                 --budget gives it more",
+            );
+            return Ok((None, None));
+        }
+        other => other.map_err(Failure::usage)?,
+    };
     let found =
         options.simplify.map(|tolerance| simplified(mesh, tolerance, &*depth, &reference, options.method));
     let quality = options.quality.then(|| {
         found.as_ref().and_then(|found| found.quality).unwrap_or_else(|| {
             let bar = progress::shares("measuring");
-            let quality = reference.measure(mesh, &bar);
+            let quality = reference.measure(mesh, &deadline::Shown(&bar, end));
             bar.finish_and_clear();
             quality
         })

@@ -177,8 +177,16 @@ impl MeshSummary {
 }
 
 fn print_quality(quality: &Quality) {
+    let is_part = quality.measured < 1.0;
+    if is_part {
+        say!(
+            "quality: the time ended when {:.0} % of the samples were measured; --budget gives it more",
+            100.0 * quality.measured
+        );
+    }
     say!(
-        "Hausdorff distance: {:.2e} (mesh to surface {:.2e}, rms {:.1e}; surface to mesh {:.2e}, rms {:.1e})",
+        "Hausdorff distance: {}{:.2e} (mesh to surface {:.2e}, rms {:.1e}; surface to mesh {:.2e}, rms {:.1e})",
+        if is_part { "at least " } else { "" },
         quality.hausdorff(),
         quality.to_surface.max,
         quality.to_surface.rms,
