@@ -260,21 +260,14 @@ fn joined_smoothly(name: &str, a: &[&str]) -> Option<Words> {
     };
     let has_a_width = matches!(a, [_, _, _]);
     match name {
+        // ω is positive inside, so that the names are the other way round for numbers
         "smin" | "smooth_min" | "smoothmin" | "smoothMin" | "soft_min" | "softmin" | "sminCubic" => words(
-            "`smooth_or` here: the smaller of two distances is that of the union",
-            &format!(
-                "to join shapes, write `{}`; for the smaller of two numbers, write `{}`",
-                call("smooth_or"),
-                call("smooth_and")
-            ),
+            "`smooth_or` joins shapes here",
+            &format!("write `{}`, or `smooth_and` for the smaller of two numbers", call("smooth_or")),
         ),
         "smax" | "smooth_max" | "smoothmax" | "smoothMax" | "soft_max" | "softmax" | "smaxCubic" => words(
-            "`smooth_and` here: the larger of two distances is that of the common part",
-            &format!(
-                "for what two shapes share, write `{}`; for the larger of two numbers, write `{}`",
-                call("smooth_and"),
-                call("smooth_or")
-            ),
+            "`smooth_and` keeps what shapes share here",
+            &format!("write `{}`, or `smooth_or` for the larger of two numbers", call("smooth_and")),
         ),
         "smooth_union" | "opSmoothUnion" if has_a_width => written("`smooth_or` here", &call("smooth_or")),
         "smooth_intersection" | "opSmoothIntersection" => written("`smooth_and` here", &call("smooth_and")),
@@ -402,12 +395,17 @@ fn solid(name: &str, a: &[&str]) -> Option<Words> {
                 }
             },
         ),
-        "frustum" => match a {
-            [low, top, h] => {
-                written("`.taper(h, top)` here", &format!("cylinder({low}, {h}).taper({h}, ({top})/({low}))"))
+        "frustum" | "truncated_cone" | "conical_frustum" | "cone_frustum" => {
+            let given = match a {
+                [low, top, h] => solids::truncated_cone((low, top), h, false),
+                _ => None,
+            };
+            match given {
+                Some(cone) if cone.starts_with("cone(") => written("`cone(r, h)` here", &cone),
+                Some(cylinder) => written("`.taper(h, top)` here", &cylinder),
+                None => written("`.taper(h, top)` here", "cylinder(1, 2).taper(2, 0.5)"),
             }
-            _ => written("`.taper(h, top)` here", "cylinder(1, 2).taper(2, 0.5)"),
-        },
+        }
         "plane" | "halfspace" | "half_plane" | "sdPlane" => {
             written("`half_space(normal, point)` here", "half_space([0, 0, 1], [0, 0, 0])")
         }

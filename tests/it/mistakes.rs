@@ -105,6 +105,7 @@ const WORDS: &[&str] = &[
     "solid s = square([1, 2]).extrude(0, 1)",
     "solid s = rect(1, 2).extrude(0, 1)",
     "solid s = frustum(1, 0.5, 2)",
+    "solid s = truncated_cone(1, 0, 2)",
     "solid s = circle(2)",
     "solid s = pipe([[0, 0, 0], [1, 0, 0]], 0.1)",
     "solid s = cube([1, 2, 3], true)",

@@ -20,6 +20,9 @@ impl Lowering<'_> {
         let message = format!("`{function}` has no parameter `{}`", first.text);
         let (what, generic) = match function {
             "box" => ("a box goes from corner to corner", "box([0, 0, 0], [1, 1, 1])"),
+            _ if call.as_ref().is_some_and(|call| call.starts_with("cone(")) => {
+                ("a cone has the radius of its base, and ends in a point", "cone(1, 2)")
+            }
             _ => (
                 "a cone that does not end in a point is a cylinder made narrower upwards",
                 "cylinder(2, 3).taper(3, 0.5)",
@@ -152,27 +155,34 @@ impl<'a> Given<'a, '_> {
             Some(Some("true" | "True")) => true,
             Some(_) => return None,
         };
-        let (bottom, top) = (amount(&low), amount(&high));
-        let is_negative = |radius: Option<(f64, &str)>| radius.is_some_and(|(radius, _)| radius < 0.0);
-        let is_point = |radius: Option<(f64, &str)>| radius.is_some_and(|(radius, _)| radius == 0.0);
-        if !self.unread.is_empty() || is_negative(bottom) || is_negative(top) {
-            return None;
+        if self.unread.is_empty() { truncated_cone((&low, &high), h, centred) } else { None }
+    }
+}
+
+/// The call for a cone by its radii below and above and its height; `None` if there is no such solid. It stands on
+/// z = 0, or has its middle there.
+pub(super) fn truncated_cone((low, high): (&str, &str), h: &str, centred: bool) -> Option<String> {
+    let (bottom, top) = (amount(low), amount(high));
+    let is_negative = |radius: Option<(f64, &str)>| radius.is_some_and(|(radius, _)| radius < 0.0);
+    let is_point = |radius: Option<(f64, &str)>| radius.is_some_and(|(radius, _)| radius == 0.0);
+    if is_negative(bottom) || is_negative(top) {
+        return None;
+    }
+    let lowered = if centred { format!(".move([0, 0, {}])", times(-0.5, h)) } else { String::new() };
+    match (is_point(bottom), is_point(top)) {
+        (true, true) => None,
+        (true, false) => {
+            let raised = if centred { times(0.5, h) } else { h.to_string() };
+            Some(format!("cone({high}, {h}).mirror([0, 0, 1]).move([0, 0, {raised}])"))
         }
-        let lowered = if centred { format!(".move([0, 0, {}])", times(-0.5, h)) } else { String::new() };
-        match (is_point(bottom), is_point(top)) {
-            (true, true) => return None,
-            (true, false) => {
-                let raised = if centred { times(0.5, h) } else { h.to_string() };
-                return Some(format!("cone({high}, {h}).mirror([0, 0, 1]).move([0, 0, {raised}])"));
-            }
-            (false, true) => return Some(format!("cone({low}, {h}){lowered}")),
-            (false, false) => {}
+        (false, true) => Some(format!("cone({low}, {h}){lowered}")),
+        (false, false) => {
+            let ratio = match (bottom, top) {
+                (Some((low, unit)), Some((high, other))) if unit == other => shown(high / low),
+                _ => format!("({high})/({low})"),
+            };
+            Some(format!("cylinder({low}, {h}).taper({h}, {ratio}){lowered}"))
         }
-        let ratio = match (bottom, top) {
-            (Some((low, unit)), Some((high, other))) if unit == other => shown(high / low),
-            _ => format!("({high})/({low})"),
-        };
-        Some(format!("cylinder({low}, {h}).taper({h}, {ratio}){lowered}"))
     }
 }
 
