@@ -17,7 +17,7 @@ pub struct Editor {
     from: BufReader<ChildStdout>,
     last: i64,
     /// Messages about the file, as they came last.
-    messages: Vec<Value>,
+    pub messages: Vec<Value>,
 }
 
 impl Editor {
@@ -102,7 +102,7 @@ impl Editor {
         }
     }
 
-    fn await_messages(&mut self) -> &[Value] {
+    pub fn await_messages(&mut self) -> &[Value] {
         loop {
             let message = self.read();
             if message["method"] == "textDocument/publishDiagnostics" {

@@ -29,6 +29,7 @@ mod looks;
 mod lsp;
 mod lsp_edits;
 mod lsp_files;
+mod lsp_measured;
 mod lsp_slices;
 mod mesh_command;
 mod mesh_properties;

@@ -1,14 +1,13 @@
 //! Measures a solid: its volume and area on meshes, and what is too thin for their cells.
 
 use super::facts::{Box3, Facts, RESOLUTION, VOLUME_CELLS};
-use crate::cli::deadline::Deadline;
 use crate::cli::failure::Failure;
 use rfm::Solid;
 use rfm::field::Field;
 use rfm::geom::{Aabb, to_thousandths};
 use rfm::glam::DVec3;
 use rfm::interval::Interval;
-use rfm::mesh::{self, Grid, Mesh, MeshError, Resolution, ThinCells, Volume, VolumeError};
+use rfm::mesh::{self, Grid, Mesh, MeshError, Resolution, ThinCells, Volume, VolumeError, Watch};
 use rfm::solid::Bounds;
 
 /// Boxes along each side of a solid in which its range is tried; one in `MOST_UNKNOWN` of them may be
@@ -23,12 +22,12 @@ const REFINED: usize = 3;
 /// What rounding may add to the sums over triangles, relative to them.
 const ROUNDING: f64 = 1e-12;
 
-/// What is known of a solid, what its meshes miss, and what is to be said about the search. At the deadline it ends
-/// with what was found until then.
+/// What is known of a solid, what its meshes miss, and what is to be said about the search. The watch may end
+/// it with what was found until then.
 pub(super) fn measure(
     solid: &Solid,
     file: &str,
-    deadline: &Deadline,
+    watch: &dyn Watch,
     notes: &mut Vec<String>,
 ) -> Result<(Facts, ThinCells), Failure> {
     let mut facts = Facts::unknown(solid, file);
@@ -56,15 +55,15 @@ pub(super) fn measure(
         }
     };
     if triangles.is_some() {
-        let thin = thin_cells(solid, &*surface, &grid, deadline, notes);
+        let thin = thin_cells(solid, &*surface, &grid, watch, notes);
         tell_of_end(solid, thin, &mut facts, notes);
         return Ok((facts, thin.unwrap_or(ThinCells::NONE)));
     }
-    let by_meshes = by_meshes(&*surface, bounds, deadline, &mut facts)?;
+    let by_meshes = by_meshes(&*surface, bounds, watch, &mut facts)?;
     if by_meshes == ByMeshes::Impossible {
         return Ok((facts, ThinCells::NONE));
     }
-    let thin = thin_cells(solid, &*surface, &grid, deadline, notes);
+    let thin = thin_cells(solid, &*surface, &grid, watch, notes);
     tell_of_end(solid, thin, &mut facts, notes);
     if let (Some(solids), Some(coarser)) = (facts.components, facts.components_coarser) {
         // what is left out at the edge of a wedge is within the errors
@@ -73,7 +72,7 @@ pub(super) fn measure(
         facts.resolved = is_known.then_some(solids == coarser && no_thin_parts);
     }
     if let Some(thin) = thin.filter(|_| facts.resolved == Some(false)) {
-        refine((solid, &*surface, bounds), (&grid, thin), deadline, (&mut facts, notes));
+        refine((solid, &*surface, bounds), (&grid, thin), watch, (&mut facts, notes));
     }
     // a part too thin for a cell would have been found
     facts.shows_nothing =
@@ -100,7 +99,7 @@ fn of_nothing(facts: Facts) -> Facts {
 /// What came of the meshes that show the volume.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum ByMeshes {
-    /// The volume, or a part of the work at the deadline.
+    /// The volume, or a part of the work until it was ended.
     Measured,
     /// No part of the solid.
     ShowNothing,
@@ -112,10 +111,10 @@ enum ByMeshes {
 fn by_meshes(
     surface: &dyn Field,
     bounds: &Aabb,
-    deadline: &Deadline,
+    watch: &dyn Watch,
     facts: &mut Facts,
 ) -> Result<ByMeshes, Failure> {
-    match mesh::volume(surface, bounds, VOLUME_CELLS, deadline) {
+    match mesh::volume(surface, bounds, VOLUME_CELLS, watch) {
         Ok(found) => take(&found, VOLUME_CELLS, facts),
         Err(VolumeError::TooThin) => {
             let why = format!("it is empty, or too thin for {VOLUME_CELLS} cells along its longest side");
@@ -198,7 +197,7 @@ fn tell_of_end(solid: &Solid, thin: Option<ThinCells>, facts: &mut Facts, notes:
 fn refine(
     (solid, surface, bounds): (&Solid, &dyn Field, &Aabb),
     (grid, thin): (&Grid, ThinCells),
-    deadline: &Deadline,
+    watch: &dyn Watch,
     (facts, notes): (&mut Facts, &mut Vec<String>),
 ) {
     let mut needed = thin.cells_needed(grid);
@@ -209,7 +208,7 @@ fn refine(
             "there was no time to measure `{}` with the {cells} cells that show its thin parts; --budget gives it more",
             solid.name()
         );
-        let thin = match mesh::thin_cells(surface, &grid, deadline) {
+        let thin = match mesh::thin_cells(surface, &grid, watch) {
             Ok(thin) if !thin.ended => thin,
             Ok(_) => {
                 facts.wants_time = true;
@@ -223,7 +222,7 @@ fn refine(
             needed = Some(thin.cells_needed(&grid).unwrap_or(0).max(cells + cells / 4));
             continue;
         }
-        match mesh::volume(surface, bounds, cells, deadline) {
+        match mesh::volume(surface, bounds, cells, watch) {
             Ok(found) if found.solids == found.solids_coarser => {
                 take(&found, cells, facts);
                 facts.resolved = Some(true);
@@ -244,7 +243,7 @@ fn thin_cells(
     solid: &Solid,
     surface: &dyn Field,
     grid: &Grid,
-    deadline: &Deadline,
+    watch: &dyn Watch,
     notes: &mut Vec<String>,
 ) -> Option<ThinCells> {
     if !knows_ranges(solid, grid.bounds()) {
@@ -255,7 +254,7 @@ fn thin_cells(
         return None;
     }
     // a formula that is not a number somewhere has no such search; its volume has reported it
-    mesh::thin_cells(surface, grid, deadline).ok()
+    mesh::thin_cells(surface, grid, watch).ok()
 }
 
 /// Whether ranges say anything about the solid nearly everywhere in a box. Where they do not, a search for

@@ -1,6 +1,6 @@
 //! Warnings that take longer than a keystroke: they are looked for in a thread of their own, once a text
-//! rests. Solids with very many operations, and those that take longer than a second, are left to
-//! `rfm check`.
+//! rests, and solids are measured after that. Solids with very many operations, and what takes longer than a
+//! second, are left to `rfm check`.
 //!
 //! Invariant: messages about a text are sent only while it is the newest one of its file. The sender holds
 //! the lock, so that older messages never follow newer ones.
@@ -12,10 +12,14 @@ use std::time::{Duration, Instant};
 
 use lsp_types::{PublishDiagnosticsParams, Uri};
 
-use rfm::Engine;
 use rfm::diagnostic::Diagnostic;
+use rfm::lower::NamedSolid;
+use rfm::mesh::Watch;
+use rfm::solid::ProgramKind;
+use rfm::{Engine, Program, Solid};
 
-use super::super::lints;
+use super::super::deadline::Deadline;
+use super::super::{check, lints};
 use super::buffers::Buffers;
 use super::document::Document;
 use super::messages;
@@ -26,6 +30,9 @@ const REST: Duration = Duration::from_millis(400);
 
 /// Time that is spent on the solids of a text. The solid at which it ends is still searched completely.
 const MOST_TIME: Duration = Duration::from_secs(1);
+
+/// Time to measure the solids of a text: what is too thin for a mesh, or without end, or empty.
+const MEASURING: f64 = 1.0;
 
 /// Solids with more operations are left to `rfm check`: one of them must not take seconds.
 const MOST_OPERATIONS: usize = 1000;
@@ -106,13 +113,21 @@ impl Background {
         let shared = Arc::clone(&background.shared);
         std::thread::spawn(move || {
             while let Some(text) = shared.wait() {
+                let send_while_newest = |messages| {
+                    let state = shared.state();
+                    if !state.is_over && state.newest.get(text.uri.as_str()) == Some(&text.number) {
+                        send(messages);
+                    }
+                };
                 // a mistake in a search must not end the others
-                let found = catch_unwind(AssertUnwindSafe(|| look(&shared, &text, encoding, &buffers)));
-                let Ok(Some(messages)) = found else { continue };
-                let state = shared.state();
-                if !state.is_over && state.newest.get(text.uri.as_str()) == Some(&text.number) {
-                    send(messages);
-                }
+                _ = catch_unwind(AssertUnwindSafe(|| {
+                    look(
+                        &shared,
+                        &text,
+                        Document::new(&text.uri, &text.text, text.version, encoding, &buffers),
+                        send_while_newest,
+                    )
+                }));
             }
         });
         background
@@ -145,39 +160,71 @@ impl Drop for Background {
     }
 }
 
-/// All messages of a text with those that are found in its solids; `None` if there are none of these, or if
-/// the text is no longer the newest.
-fn look(
-    shared: &Shared,
-    text: &Text,
-    encoding: Encoding,
-    buffers: &Buffers,
-) -> Option<PublishDiagnosticsParams> {
+/// Looks for warnings about the formulas of a text, then for those that measuring its solids gives. Each time that some
+/// are found, all messages of the text are sent.
+fn look(shared: &Shared, text: &Text, mut document: Document, send: impl Fn(PublishDiagnosticsParams)) {
+    for search in [by_formulas, by_measuring] {
+        let Some(program) = &document.program else { return };
+        if !shared.is_newest(text) {
+            return;
+        }
+        let found = search(shared, text, program);
+        if !found.is_empty() {
+            document.messages.list.extend(found);
+            send(messages::published(&text.uri, &document));
+        }
+    }
+}
+
+/// Each solid of a program that is small enough, by its name in the file. Why one cannot be compiled is among the
+/// messages of the text.
+fn solids(program: &Program) -> impl Iterator<Item = (&NamedSolid, Solid)> {
+    let is_small = |solid: &Solid| solid.graph(ProgramKind::Value).0.len() <= MOST_OPERATIONS;
+    program.module().solids.iter().filter_map(move |named| {
+        let solid = program.solid_with(&named.name, Engine::Auto).ok().filter(is_small)?;
+        Some((named, solid))
+    })
+}
+
+/// What formulas show. If the text is no longer the newest, that is nothing.
+fn by_formulas(shared: &Shared, text: &Text, program: &Program) -> Vec<Diagnostic> {
     let started = Instant::now();
-    let mut document = Document::new(&text.uri, &text.text, text.version, encoding, buffers);
-    let program = document.program.as_ref()?;
     let mut searches = lints::Searches::short();
     let mut found: Vec<Diagnostic> = Vec::new();
-    for named in &program.module().solids {
+    for (named, solid) in solids(program) {
         if !shared.is_newest(text) {
-            return None;
+            return Vec::new();
         }
         if started.elapsed() > MOST_TIME {
             break;
         }
-        // why a solid cannot be compiled is among the messages of the text
-        let Ok(solid) = program.solid_with(&named.name, Engine::Auto) else { continue };
-        if solid.graph(rfm::solid::ProgramKind::Value).0.len() <= MOST_OPERATIONS {
-            found.extend(lints::of_solid(program, named, &solid, &mut searches));
-        }
+        found.extend(lints::of_solid(program, named, &solid, &mut searches));
     }
     if shared.is_newest(text) && started.elapsed() < MOST_TIME {
         // why a scene cannot be compiled is among the messages of the text, too
         found.extend(lints::of_scenes(Engine::Auto, program, &mut searches).unwrap_or_default());
     }
-    if found.is_empty() {
-        return None;
+    found
+}
+
+/// What `rfm check` says after it has measured the solids, as far as there is time.
+fn by_measuring(shared: &Shared, text: &Text, program: &Program) -> Vec<Diagnostic> {
+    let watch = WhileNewest { shared, text, deadline: Deadline::after(MEASURING) };
+    let all = solids(program).take_while(|_| !watch.is_over());
+    // what cannot be measured at all is left to `rfm check`, too
+    all.flat_map(|(named, solid)| check::by_measuring(program, named, &solid, &watch).unwrap_or_default())
+        .collect()
+}
+
+/// Ends the work on a text at a deadline, or when there is a newer one.
+struct WhileNewest<'a> {
+    shared: &'a Shared,
+    text: &'a Text,
+    deadline: Deadline,
+}
+
+impl Watch for WhileNewest<'_> {
+    fn is_over(&self) -> bool {
+        self.deadline.is_over() || !self.shared.is_newest(self.text)
     }
-    document.messages.list.extend(found);
-    Some(messages::published(&text.uri, &document))
 }
