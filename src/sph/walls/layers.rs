@@ -17,7 +17,7 @@ pub(in crate::sph) enum ViscousForces {
     /// Along the lines between particles.
     #[default]
     AlongLines,
-    /// Against all relative motion but the turning of each neighbourhood: more exact, by one more sum over
+    /// Against all relative motion but the turning of each neighbourhood: more exact, by two more sums over
     /// neighbours.
     WithSpin,
 }

@@ -28,7 +28,7 @@
 //! Viscosity: laminar (Monaghan & Gingold 1983, with the factor 2(d + 2) = 10 of three dimensions) and
 //! artificial (Monaghan 1992); with pairs of pressures the artificial one acts on rough motion alone
 //! ([`Roughness`]). Both act along the lines between particles, so with pairs of pressures they conserve
-//! angular momentum.
+//! angular momentum. The laminar one of a fluid whose viscosity counts is that of [`SpinViscosity`], which does too.
 //!
 //! With `gradients: differences` the depth of the fluid has gradients by differences instead. They are
 //! divided by the gradient of a position by the same sum: the tensor −Σ V r⊗∇W over a particle's neighbours
