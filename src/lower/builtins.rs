@@ -3,7 +3,7 @@
 use super::lowering::Lowering;
 use super::value::Value;
 use crate::diagnostic::{Code, Diagnostic, Span};
-use crate::ir::{self, Binary, BinaryFunction, Node, Unary, UnaryFunction};
+use crate::ir::{self, Binary, BinaryFunction, Node, Unary};
 use crate::syntax::ast::{Argument, Expr, ExprKind, Name};
 
 /// A function of the language.
@@ -32,10 +32,9 @@ enum Meaning {
     Unevaluated(fn(&mut Lowering<'_>, &[Argument], Span) -> Value),
 }
 
-/// The builtins that are more than one operation on one number, and other names of operations.
-const COMPOSED: [Builtin; 31] = {
+/// The builtins that are more than one operation on one number.
+const COMPOSED: [Builtin; 30] = {
     use Meaning::{Number, NumberOfVectors, Unevaluated, Value, Vector};
-    const NATURAL_LOGARITHM: Unary = Unary::Call(UnaryFunction::Ln);
     const MANY: usize = usize::MAX;
     const fn builtin(name: &'static str, arity: (usize, usize), meaning: Meaning) -> Builtin {
         Builtin { name, arity, meaning }
@@ -46,8 +45,6 @@ const COMPOSED: [Builtin; 31] = {
             (2, 2),
             Number(|l, a, span| l.binary(BinaryFunction::Atan2.into(), a[0], a[1], span)),
         ),
-        // the name in C, Python, NumPy and GLSL
-        builtin("log", (1, 1), Meaning::Unary(NATURAL_LOGARITHM)),
         builtin("pow", (2, 2), Number(|l, a, span| l.raise(a[0], a[1], span))),
         builtin("min", (2, MANY), Number(|l, a, span| l.chain(Binary::Min, a, span))),
         builtin("max", (2, MANY), Number(|l, a, span| l.chain(Binary::Max, a, span))),
@@ -204,14 +201,6 @@ impl Lowering<'_> {
                 let written: Option<Vec<&str>> = arguments.iter().map(|a| self.written(&a.value)).collect();
                 let written = written.map_or("y, x".to_string(), |both| both.join(", "));
                 diagnostic.help(format!("the angle of two sides is `atan2` here: write `atan2({written})`"))
-            }
-            ("log", _) if arguments.len() == 2 => {
-                let written: Option<Vec<&str>> = arguments.iter().map(|a| self.written(&a.value)).collect();
-                let call = match written.as_deref() {
-                    Some([number, base]) => format!("ln({number})/ln({base})"),
-                    _ => "ln(x)/ln(base)".to_string(),
-                };
-                diagnostic.help(format!("the base of `log` is e: write `{call}`"))
             }
             ("round", _) => diagnostic.help("edges are rounded by a method of shapes: `box().round(0.1)`"),
             (_, Some(call)) => diagnostic.help(format!("write for example `{call}`")),

@@ -441,7 +441,7 @@ fn number(name: &str, a: &[&str]) -> Option<Words> {
     let first = a.first().copied().unwrap_or("a");
     let call = |name: &str| format!("{name}({})", if a.is_empty() { "a, b".into() } else { a.join(", ") });
     match name {
-        "loge" | "logn" => written("`ln` here", &format!("ln({first})")),
+        "log" | "loge" => written("`ln` here, or `log10`", &format!("ln({first})")),
         "lg" => written("`log10` here", &format!("log10({first})")),
         "exp2" => written("`^` here", &format!("2^({first})")),
         "fmod" | "rem" => written("`mod` here", &call("mod")),

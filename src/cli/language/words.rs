@@ -70,7 +70,6 @@ const FUNCTIONS: &[(&str, &str, &str)] = &[
     ("tanh", "e", "the hyperbolic tangent"),
     ("exp", "e", "e to the power of a number"),
     ("ln", "e", "the natural logarithm"),
-    ("log", "e", "the natural logarithm, as `ln`; `log10` has the base 10"),
     ("log2", "e", "the logarithm to base 2"),
     ("log10", "e", "the logarithm to base 10"),
     ("sign", "e", "1, 0 or −1"),
