@@ -256,7 +256,9 @@ pub(super) fn sound_speed(parameters: &Parameters) -> String {
     let origin = match (parameters.states_sound_speed(), &parameters.method) {
         (true, _) => "stated",
         (false, Method::Paper(_)) => "the root of the stiffness",
-        (false, Method::Wcsph(_) | Method::Dfsph(_)) => "derived from the greatest speed that is foreseen",
+        (false, Method::Wcsph(_) | Method::Dfsph(_)) => {
+            "derived from the speeds and pressures that are foreseen"
+        }
     };
     format!("{} m/s ({origin})", significant(parameters.sound_speed(), 3))
 }

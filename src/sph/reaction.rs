@@ -72,7 +72,7 @@ impl<'a> Reaction<'a> {
         };
         let force: Option<fn(Share) -> DVec3> = match self.forces {
             Noted::Nothing => None,
-            Noted::Friction if pushed.by_friction == DVec3::ZERO => None,
+            Noted::Friction if pushed.by_friction == DVec3::ZERO && pushed.couple == DVec3::ZERO => None,
             Noted::Friction => Some(|share| share.by_friction),
             Noted::Forces => Some(|share| share.by_pressure + share.by_friction),
         };

@@ -369,7 +369,7 @@ fn water_leaves_a_tank_with_the_speed_of_a_fall() {
 
 #[test]
 fn a_channel_that_closes_on_itself_has_its_profile() {
-    // eight spacings across; twenty deviate by 1.6 %
+    // eight spacings across; twenty deviate by 0.8 %
     velocity_within("poiseuille", &[("particles", 2413.0)], 0.03);
 }
 

@@ -181,7 +181,7 @@ fn print_quality(quality: &Quality) {
     if is_part {
         say!(
             "quality: the time ended when {:.0} % of the samples were measured; --budget gives it more",
-            100.0 * quality.measured
+            (100.0 * quality.measured).floor()
         );
     }
     say!(

@@ -21,7 +21,7 @@ pub fn methods_overview() -> String {
 pub fn methods_reference() -> String {
     let mut text = format!(
         "# Methods of the solver\n\nThis page is what `rfm explain --methods` prints. A key that the method of a scene does \
-         not have is an error.\n\n{}",
+         not have is an error.\n\n{}\n{VISCOUS_FORCES}",
         methods_overview()
     );
     for method in Method::all().iter().map(Method::info) {
@@ -30,6 +30,13 @@ pub fn methods_reference() -> String {
     }
     text
 }
+
+/// Which viscous forces a fluid has.
+const VISCOUS_FORCES: &str = "\
+Viscous forces of `wcsph` and `dfsph` take away the turning of each neighbourhood if the kinematic viscosity of the fluid is \
+above a tenth of αhc/20, with the α that damps noise by default. Those of thinner fluids act along the lines between \
+particles, and resist layers that slide along each other by only 0.76 to 0.93 of their viscosity.
+";
 
 /// The section of the [`methods_reference`] about one method.
 pub fn method_reference(method: Method) -> String {

@@ -392,7 +392,7 @@ impl Boundary {
         if let Some(velocity) = motion {
             coverage.set_in_motion(velocity);
         }
-        if !F::IS_NONE {
+        if !F::IS_NONE && obstacle.slip == Slip::No {
             let stated = obstacle.surface_velocity.as_ref().map(|velocity| velocity(p, self.time));
             if let Some(velocity) = stated.or(motion) {
                 let turning = match wall.viscous_forces {
@@ -405,12 +405,15 @@ impl Boundary {
         coverage
     }
 
-    /// By how much an obstacle's surface turns near a place: half the curl of its velocity, 1/s.
+    /// By how much an obstacle's surface turns near a place: half the curl of its velocity, 1/s. Of a body that changes
+    /// its shape only the velocity across the surface is known, and half of its turning.
     pub fn turning(&self, k: usize, p: DVec3, h: f64) -> DVec3 {
         let step = TURNING_STEP * h;
         let velocity = self.velocity_along(k, p);
         let slope = |axis: DVec3| (self.velocity_along(k, p + step * axis) - velocity) / step;
-        0.5 * DVec3::AXES.into_iter().map(|axis| axis.cross(slope(axis))).sum::<DVec3>()
+        // a motion that has no slope at an edge turns nothing there
+        let curl = DVec3::AXES.into_iter().map(|axis| axis.cross(slope(axis))).sum::<DVec3>();
+        if curl.is_finite() { 0.5 * curl } else { DVec3::ZERO }
     }
 
     fn collide_block(&self, block: &mut Block<'_>, contacts: Option<&Contacts>) -> Result<(), Fault> {

@@ -1,7 +1,7 @@
 //! Friction between walls and a viscous fluid, which sticks to them or slips along them. A fluid without
 //! viscosity carries none of this data.
 //!
-//! Viscous forces act along the lines between particles (Monaghan & Gingold 1983): 10ν Σ V (v_ij·r)/r²·∇W. So they
+//! Viscous forces of thin fluids act along the lines between particles (Monaghan & Gingold 1983): 10ν Σ V (v_ij·r)/r²·∇W. So they
 //! conserve angular momentum, leave a rigid rotation alone, and vanish at a free surface as the stress does
 //! there (Colagrossi et al. 2011). A wall to which the fluid sticks continues the velocity linearly. With s the
 //! distance along the wall's normal and ρ along the wall, its part is −2ν·v/d times
@@ -25,7 +25,7 @@
 //!
 //! Forces less the turning of each neighbourhood ([`ViscousForces::WithSpin`]) need other integrals. Behind a
 //! wall the flow turns as it does before it, and what is left of it is half of the linear velocity. So the part of
-//! the wall is −2ν·v/d times A, and m = ∫_{s>d} s(s − d)·|W'|/r dV is K_n − δA = λ. (A curved wall changes neither:
+//! the wall is −2ν·v/d times A, and m = ∫_{s>d} s(s − d)·|W'|/r dV is K_n − δA: λ, but for walls in layers. (A curved wall changes neither:
 //! a flow around it bends by the wall's curvature, too, and the wall is farther away beside the normal. The one adds
 //! −H·m·v/d, the other H·λ·v/d.)
 //!
@@ -125,23 +125,27 @@ impl Friction for WallDrag {
         let square = Symmetric::square(face.normal);
         let (delta, distance) = (face.distance / wall.h, face.distance.max(NEAREST * wall.h));
         let drag = |area: f64, beyond: f64| Self {
-            tensor: area / (wall.h * distance) * (Symmetric::IDENTITY - square),
+            tensor: area / distance * (Symmetric::IDENTITY - square),
             beyond,
             ..Self::default()
         };
+        let area = taken.area / wall.h;
         match wall.viscous_forces {
-            ViscousForces::AlongLines => drag(taken.area * along_lines(delta), beyond_lines(delta)),
+            ViscousForces::AlongLines => drag(area * along_lines(delta), beyond_lines(delta)),
             ViscousForces::WithSpin => Self {
                 sticky: taken.part,
                 spread: taken.spread * square,
                 arm: (taken.part + taken.spread) / distance * face.normal,
-                ..drag(taken.area, taken.part)
+                ..drag(area, taken.part + taken.spread - delta * taken.area)
             },
         }
     }
 
     fn joined(&self, other: &Self, rule: impl Fn(f64, f64) -> (f64, f64, f64)) -> Self {
-        let (sticky, of_self, of_other) = rule(self.sticky, other.sticky);
+        // forces along lines do not ask for it
+        let turns = self.sticky != 0.0 || other.sticky != 0.0;
+        let (sticky, of_self, of_other) =
+            if turns { rule(self.sticky, other.sticky) } else { (0.0, 0.0, 0.0) };
         let (beyond, da, db) = rule(self.beyond, other.beyond);
         Self {
             tensor: da * self.tensor + db * other.tensor,

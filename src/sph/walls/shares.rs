@@ -50,8 +50,8 @@ pub(in crate::sph) struct Pushed {
 impl Pushed {
     /// Whether walls do nothing.
     pub fn is_nothing(&self) -> bool {
-        let Self { by_pressure, factor, by_friction, .. } = *self;
-        (by_pressure, factor, by_friction) == (DVec3::ZERO, 0.0, DVec3::ZERO)
+        let Self { by_pressure, factor, by_friction, couple, .. } = *self;
+        (by_pressure, factor, by_friction, couple) == (DVec3::ZERO, 0.0, DVec3::ZERO, DVec3::ZERO)
     }
 }
 
@@ -132,7 +132,7 @@ impl Boundary {
     /// Each wall to which the fluid sticks rubs as if it were alone, and so do walls on both sides of a narrow
     /// gap, which rub against each other. What is left, because walls overlap in a corner or the velocity bends
     /// towards them, is divided among them by the directions along them. All shares, that of the box included, add
-    /// up to the whole.
+    /// up to the whole, except for couples, which each wall exerts as if it were alone.
     pub fn divide(&self, wall: &Wall, p: DVec3, pushed: &Pushed, mut tell: impl FnMut(usize, Share)) {
         let mut near = self.near(wall, p);
         if let [] | [_] = &near[..] {

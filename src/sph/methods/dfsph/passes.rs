@@ -256,9 +256,8 @@ pub(super) struct Drag<'a, const LAMINAR: bool, const ARTIFICIAL: bool> {
     pub gravity: DVec3,
     /// Viscous forces that replace those along lines.
     pub spin: Option<SpinSums<'a>>,
-    /// G of each particle, by which viscous forces are divided in a fluid that fills its vessel. Its particles are
-    /// lighter than the room that they have, because packing them leaves gaps.
-    pub spread: Option<&'a [f64]>,
+    /// Factor of those: the room that a particle has over its volume.
+    pub room: f64,
     /// Receives the forces of walls, if they are wanted.
     pub reaction: Option<Reaction<'a>>,
 }
@@ -308,25 +307,21 @@ impl<const LAMINAR: bool, const ARTIFICIAL: bool> PairPass<6, 10, 6> for Drag<'_
         let Constants { mass_steepness, rest_density, .. } = self.constants;
         let factor = mass_steepness / rest_density;
         let mut drag = match self.spin {
-            Some(sums) => sums.drag(i, self.kinematic),
+            Some(sums) => sums.drag(i, self.room * self.kinematic),
             None => 10.0 * self.kinematic * factor * DVec3::new(x, y, z),
         };
-        let share = self.spread.map_or(1.0, |spread| {
-            let spread = spread[i];
-            1.0 + depth(spread) * (1.0 / spread - 1.0)
-        });
         if LAMINAR && let Some((wall, _)) = self.walls.near(i) {
             let velocity = self.velocity.get(i);
+            let viscosity = if self.spin.is_some() { self.room * self.kinematic } else { self.kinematic };
             if let Some(reaction) = &self.reaction {
-                let by_friction = share * wall.friction.by_walls(drag, velocity, self.kinematic);
-                let viscosity = share * self.kinematic;
+                let by_friction = wall.friction.by_walls(drag, velocity, viscosity);
                 let pushed = Pushed { by_friction, velocity, viscosity, ..Pushed::default() };
                 let turned = self.spin.map(|sums| sums.with_couple(i, &wall.friction, pushed));
                 reaction.add(i, turned.unwrap_or(pushed));
             }
-            drag = wall.friction.complete(drag, velocity, self.kinematic);
+            drag = wall.friction.complete(drag, velocity, viscosity);
         }
-        let a = share * drag + self.artificial * factor * DVec3::new(dx, dy, dz) + self.gravity;
+        let a = drag + self.artificial * factor * DVec3::new(dx, dy, dz) + self.gravity;
         let smooth = if ARTIFICIAL { DVec3::new(sx, sy, sz) / weights } else { DVec3::ZERO };
         [a.x, a.y, a.z, smooth.x, smooth.y, smooth.z]
     }

@@ -167,6 +167,17 @@ pub struct DivergenceFree {
     last_dt: f64,
 }
 
+/// The room that the particles of a fluid have which fills its vessel, over their volume: one over the mean of their
+/// G. Packing them leaves gaps, so they are lighter than their room, and their sums smaller. (With G of each particle
+/// forces in pairs would not conserve momentum.)
+fn room_over_volume(spread: &[f64]) -> f64 {
+    let mean = spread.iter().sum::<f64>() / spread.len().max(1) as f64;
+    if mean > LEAST_SPREAD { 1.0 / mean } else { 1.0 }
+}
+
+/// A fluid with a smaller mean G than this fills no vessel.
+const LEAST_SPREAD: f64 = 0.8;
+
 /// Greatest factor of a force that depends on the place. A step may be a short remainder before a frame; the
 /// force of half a usual step would then need a pressure a hundred times as large.
 const MOST_CARRIED: f64 = 2.0;
@@ -354,7 +365,7 @@ impl DivergenceFree {
             let out = [&mut x[..], y, z, &mut smooth.x, &mut smooth.y, &mut smooth.z];
             let (walls, reaction) = (&self.walls, Reaction::of(core, dt));
             let spin = self.viscosity.find(core, velocity, |i| walls.near(i).map(|(wall, _)| wall.friction));
-            let spread = parameters.fills_vessel.then_some(&self.spread[..]);
+            let room = if parameters.fills_vessel { room_over_volume(&self.spread) } else { 1.0 };
             macro_rules! drag {
                 ($laminar:literal, $artificial:literal) => {{
                     let pass = Drag::<$laminar, $artificial> {
@@ -365,7 +376,7 @@ impl DivergenceFree {
                         artificial,
                         gravity: g,
                         spin,
-                        spread,
+                        room,
                         reaction,
                     };
                     core.sum(&pass, fields, out);
