@@ -18,6 +18,7 @@ mod explain;
 mod failure;
 mod findings;
 mod fmt;
+mod hidden;
 mod init;
 mod input;
 mod language;

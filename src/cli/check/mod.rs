@@ -2,7 +2,7 @@
 
 mod facts;
 mod measure;
-mod remarks;
+pub(super) mod remarks;
 
 use std::io::IsTerminal;
 use std::path::{Path, PathBuf};
@@ -18,7 +18,6 @@ use super::shared::Shared;
 use super::{choose, input, lints, output, section};
 use facts::{Box3, Facts, print};
 use measure::measure;
-pub(super) use remarks::by_measuring;
 use rfm::diagnostic::Diagnostics;
 use rfm::lower::NamedSolid;
 use rfm::mesh::ThinCells;

@@ -1,7 +1,7 @@
 //! Warnings about solids that `rfm check` finds by measuring them, and editors after a pause in typing.
 
 use super::super::failure::Failure;
-use super::super::mesh::hidden;
+use super::super::hidden::hidden;
 use super::facts::{Facts, RESOLUTION, VOLUME_CELLS};
 use super::measure::measure;
 use rfm::diagnostic::{Code, Diagnostic};

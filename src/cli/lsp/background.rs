@@ -18,8 +18,9 @@ use rfm::mesh::Watch;
 use rfm::solid::ProgramKind;
 use rfm::{Engine, Program, Solid};
 
+use super::super::check::remarks::by_measuring as remarks;
 use super::super::deadline::Deadline;
-use super::super::{check, lints};
+use super::super::lints;
 use super::buffers::Buffers;
 use super::document::Document;
 use super::messages;
@@ -212,8 +213,7 @@ fn by_measuring(shared: &Shared, text: &Text, program: &Program) -> Vec<Diagnost
     let watch = WhileNewest { shared, text, deadline: Deadline::after(MEASURING) };
     let all = solids(program).take_while(|_| !watch.is_over());
     // what cannot be measured at all is left to `rfm check`, too
-    all.flat_map(|(named, solid)| check::by_measuring(program, named, &solid, &watch).unwrap_or_default())
-        .collect()
+    all.flat_map(|(named, solid)| remarks(program, named, &solid, &watch).unwrap_or_default()).collect()
 }
 
 /// Ends the work on a text at a deadline, or when there is a newer one.

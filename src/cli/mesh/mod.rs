@@ -13,13 +13,14 @@ use std::time::Instant;
 use super::args::{Mesh as Options, MeshMethod};
 use super::deadline::{self, Deadline};
 use super::failure::{Failure, complain, note};
+use super::hidden::hidden;
 use super::shared::Shared;
 use super::{choose, input, output, progress};
 use crate::cli::output::Shown;
 pub(super) use format::{ascii_help, format_name, output_help, unit_help, unit_name};
 use rfm::Solid;
 use rfm::field::Field;
-use rfm::geom::{Aabb, to_thousandths};
+use rfm::geom::Aabb;
 use rfm::mesh::{
     self, Grid, GridError, LengthUnit, Mesh, MeshError, Quality, Reference, Resolution, ThinCells, Watch,
     WriteMesh, dual_contouring, marching_cubes,
@@ -298,27 +299,6 @@ fn measured(
         })
     });
     Ok((quality, found))
-}
-
-/// The parts that a grid cannot show, as a sentence without its subject: how much, where, and how many cells
-/// would show them.
-pub(super) fn hidden(thin: &ThinCells, grid: &Grid) -> String {
-    let what = if thin.is_gap { "a gap" } else { "a part" };
-    let how = match thin.cells_needed(grid) {
-        Some(needed) => format!("{what} {:.2e} thick: about {needed} cells would show it", thin.thickness),
-        None if thin.is_wedge => format!("{what} that ends in a sharp edge"),
-        None if thin.thickness.is_finite() => {
-            format!("{what} {:.0e} thick, which no grid around all of it shows", thin.thickness)
-        }
-        None => format!("{what} of unknown thickness"),
-    };
-    format!(
-        "in {} cells between {:.3} and {:.3}, the thinnest at {:.3}, {how}",
-        thin.count,
-        to_thousandths(thin.bounds.min),
-        to_thousandths(thin.bounds.max),
-        to_thousandths(thin.at)
-    )
 }
 
 /// Says on standard error what the grid could not see, and why a mesh is empty.

@@ -5,7 +5,8 @@ use std::sync::OnceLock;
 
 use super::super::args::Run;
 use super::super::deadline::Deadline;
-use super::super::mesh::{LEAST_SEARCH, hidden, no_grid};
+use super::super::hidden::hidden;
+use super::super::mesh::{LEAST_SEARCH, no_grid};
 use super::super::{Failure, note};
 use rfm::geom::{Aabb, Placement};
 use rfm::mesh::{self, Grid, Mesh, Resolution, Unwatched, dual_contouring};
