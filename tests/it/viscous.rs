@@ -113,7 +113,8 @@ scene s {{
 /// in part by a couple: forces at the places of the particles would be some percent too large.
 #[test]
 fn a_turning_vessel_gives_what_the_honey_gets() {
-    for (method, keys) in [("dfsph", ""), ("wcsph", ", gradients: pairs")] {
+    // wcsph gives half of a force now and half with the next one, and here forces fade
+    for (method, keys, within) in [("dfsph", "", 1e-3), ("wcsph", ", gradients: pairs", 0.02)] {
         let mut simulation = simulation(&format!(
             "rfm 1
 solid vessel = sphere(0.2)
@@ -128,7 +129,6 @@ scene s {{
         ));
         let probe = Probe::Force { obstacle: 0, about: DVec3::ZERO };
         let mut gauge = simulation.gauge(probe).unwrap_or_else(|e| panic!("{e}"));
-        // wcsph gives half of a force now and half with the next one, which matters where it sets in
         run_to(&mut simulation, 0.03);
         let before = momentum(&simulation);
         simulation.sample(&mut gauge);
@@ -140,7 +140,7 @@ scene s {{
         }
         let gained = simulation.parameters().particle_mass * (momentum(&simulation) - before);
         println!("{method}: {given:.5} N m s from the vessel, {gained:.5} N m s in the honey");
-        assert!(gained > 0.5 && (given / gained - 1.0).abs() < 0.01, "{method}: {given} {gained}");
+        assert!(gained > 0.5 && (given / gained - 1.0).abs() < within, "{method}: {given} {gained}");
     }
 }
 
