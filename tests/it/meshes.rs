@@ -236,3 +236,40 @@ fn volumes_and_areas_are_right_within_their_errors() {
     area_errors.sort_by(f64::total_cmp);
     assert!(area_errors[shapes.len() / 2] < 1e-3, "{area_errors:?}");
 }
+
+/// How far a point lies outside of a box or cylinder whose edges are rounded, from its distances beyond the faces
+/// of the solid that is smaller by the radius.
+fn beyond_rounded<const N: usize>(beyond: [f64; N], radius: f64) -> f64 {
+    let outside = beyond.iter().map(|x| x.max(0.0).powi(2)).sum::<f64>().sqrt();
+    outside + beyond.into_iter().fold(f64::NEG_INFINITY, f64::max).min(0.0) - radius
+}
+
+/// Searches for the surface end at rounding, which is larger than any fixed share of a cell far from the origin, or
+/// of the cells of a part of some micrometres.
+#[test]
+fn vertices_are_as_exact_as_coordinates_far_from_the_origin() {
+    let round_box = |p: DVec3| {
+        let beyond = (p - DVec3::new(0.5, 1.0, 1.5)).abs() - DVec3::new(0.4, 0.9, 1.4);
+        beyond_rounded(beyond.to_array(), 0.1)
+    };
+    let can = |p: DVec3| beyond_rounded([p.x.hypot(p.y) - 0.9, (p.z - 1.0).abs() - 0.9], 0.1);
+    let solids: [(&str, &dyn Fn(DVec3) -> f64); 2] =
+        [("box([0, 0, 0], [1, 2, 3])", &round_box), ("cylinder(1, 2)", &can)];
+    for ((text, distance), cells) in solids.into_iter().flat_map(|of| [20, 50, 64].map(|cells| (of, cells))) {
+        let mut counts = Vec::new();
+        for (scale, away) in [(1.0, 0.0), (1.0, 3e3), (1.0, 1e4), (1.0, 1e6), (1e-6, 1.0)] {
+            let moved =
+                format!("rfm 1\nsolid s = {text}.round(0.1).scale({scale:e}).move([{away}, {away}, {away}])");
+            let solid = solid(&moved, "s");
+            let grid = around(&solid, cells);
+            let mesh = dual_contouring(&*solid.surface(*grid.bounds()), &grid, &Unwatched).unwrap();
+            // each coordinate is rounded by at most ε/2 of itself, and ω once more by about as much
+            let rounding = 2.0 * f64::EPSILON * (away + 3.0 * scale);
+            let found = |p: &DVec3| scale * distance((p - away) / scale).abs();
+            let worst = mesh.positions.iter().map(found).fold(0.0, f64::max);
+            assert!(worst <= rounding, "{moved} with {cells} cells: {worst:e} of {rounding:e}");
+            counts.push(mesh.positions.len());
+        }
+        assert!(counts[..4].iter().all(|count| *count == counts[0]), "{text} with {cells} cells: {counts:?}");
+    }
+}

@@ -10,6 +10,7 @@
 use glam::DVec3;
 
 use super::super::normals::{GradientColumns, unit};
+use super::project::negligible;
 use super::vertices::Hit;
 use crate::field::Field;
 use crate::geom::Aabb;
@@ -124,7 +125,7 @@ pub(super) fn settle(
             if !(at[i].cmpge(min - margin) & at[i].cmple(max + margin)).all() {
                 return false; // NaN, too
             }
-            let stays = step.length() > LAST_STEP * size;
+            let stays = step.length() > negligible(LAST_STEP, size, at[i]);
             if !stays {
                 let normal = unit(-gradient).filter(|normal| bends[i].is_between(*normal));
                 settled[i] = normal.map(|normal| Settled { position: at[i], normal });

@@ -18,6 +18,10 @@ use crate::field::Field;
 /// own faces. What the last one leaves is below rounding.
 const DISTANCES: [f64; 4] = [0.2, 0.02, 1e-3, 1e-6];
 
+/// Probes are at least this many times as far from the crease as points are rounded there, so that they fall on
+/// their own faces far from the origin, too.
+const PROBES_APART: f64 = 16.0;
+
 /// Faces whose normals differ by less than this make no crease (the cosine of 2.5°).
 const SMOOTH: f64 = 0.999;
 
@@ -40,7 +44,8 @@ pub(super) fn find(
     planes[..faces.len()].copy_from_slice(faces);
     let planes = &mut planes[..faces.len()];
     let mut at = meeting_point(start, planes)?;
-    for delta in DISTANCES.map(|share| share * size) {
+    let least = project::negligible(0.0, size, PROBES_APART * start);
+    for delta in DISTANCES.map(|share| (share * size).max(least)) {
         if at.distance(start) > 2.0 * size {
             return None;
         }
@@ -53,7 +58,7 @@ pub(super) fn find(
     }
     *count += 1;
     let (omega, gradient) = field.omega_grad(at);
-    (omega.abs() <= RESIDUAL * size * gradient.length()).then_some(at)
+    (omega.abs() <= project::negligible(RESIDUAL, size, at) * gradient.length()).then_some(at)
 }
 
 /// The tangent plane of the face near a probe. It misses the face by the square of their distance, as a plane

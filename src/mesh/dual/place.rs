@@ -385,7 +385,7 @@ impl Placement<'_> {
                 slots.positions[v] -= gradient * (omega / squared);
                 let normal = -gradient / slope;
                 slots.normals[v] = if normal.is_finite() { normal } else { DVec3::ZERO };
-                omega.abs() > LAST_STEP * size * slope
+                omega.abs() > project::negligible(LAST_STEP, size, slots.positions[v]) * slope
             });
             drop(found);
             positions.clear();

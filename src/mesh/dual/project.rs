@@ -12,8 +12,12 @@ use crate::field::Field;
 /// Maximum number of Newton steps: twice as many as a smooth surface takes.
 const STEPS: usize = 8;
 
-/// A step this small, in sizes, ends the search, because the next one would be below rounding.
+/// A step this small, in sizes, ends the search, because the next one would be its square.
 const LAST_STEP: f64 = 1e-9;
+
+/// A step this small, relative to the largest coordinate, is rounding: that of a coordinate moves a point by half
+/// as much as its last digit, and ω at a moved solid is off by a few such digits.
+const ROUNDING: f64 = 8.0 * f64::EPSILON;
 
 /// A face turns by less than this between a point and its foot (cosine).
 pub(super) const SAME_FACE: f64 = 0.8;
@@ -33,6 +37,12 @@ pub(super) struct FacePoint {
     pub normal: DVec3,
 }
 
+/// A length near `p` that is as good as none: a share of a size, or rounding where that is larger. Far from the
+/// origin no step of Newton's method gets below rounding, so one that waited for it would never end.
+pub(super) fn negligible(share: f64, size: f64, p: DVec3) -> f64 {
+    (share * size).max(ROUNDING * p.abs().max_element())
+}
+
 /// A point of the surface within `size` of `start`, by Newton's method. `None` if it leads farther away or
 /// does not converge.
 pub(super) fn newton(field: &dyn Field, start: DVec3, size: f64, count: &mut u64) -> Option<FacePoint> {
@@ -45,7 +55,7 @@ pub(super) fn newton(field: &dyn Field, start: DVec3, size: f64, count: &mut u64
         if at.is_nan() || at.distance(start) > size {
             return None;
         }
-        if step.length() <= LAST_STEP * size {
+        if step.length() <= negligible(LAST_STEP, size, at) {
             return Some(FacePoint { point: at, normal: unit(-gradient)? });
         }
     }

@@ -308,7 +308,7 @@ fn settle(field: &dyn Field, bends: Vec<Bend>, tolerance: f64, count: &mut u64) 
         for (bend, settled) in bends.iter_mut().filter(|(_, settled)| !settled) {
             let Some(found) = found.next() else { break };
             bend.normal = unit(-found.1).unwrap_or(DVec3::ZERO);
-            *settled = bend.step(found) <= LAST_STEP * tolerance;
+            *settled = bend.step(found) <= project::negligible(LAST_STEP, tolerance, bend.position);
         }
     }
     for (bend, settled) in &mut bends {

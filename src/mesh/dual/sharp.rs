@@ -7,7 +7,7 @@
 use glam::DVec3;
 
 use super::super::normals::unit;
-use super::project::FacePoint;
+use super::project::{FacePoint, negligible};
 use super::vertices::{Hit, Vertex, VertexKind};
 use super::{crease, qef};
 use crate::field::Field;
@@ -51,7 +51,8 @@ pub(super) fn at_crease(
 ) -> Vertex {
     let size = spacing.min_element();
     let lies_within = |p: DVec3, reach: f64| {
-        p.cmpge(cell.min - reach * spacing).all() && p.cmple(cell.max + reach * spacing).all()
+        let margin = spacing.map(|side| negligible(reach, side, p));
+        p.cmpge(cell.min - margin).all() && p.cmple(cell.max + margin).all()
     };
     let sharp = |position| Vertex { position, normal: DVec3::ZERO, kind: VertexKind::Sharp };
 
@@ -61,7 +62,7 @@ pub(super) fn at_crease(
     if lies_within(least, reach_of(rank)) {
         *count += 1;
         let (omega, gradient) = field.omega_grad(least);
-        if omega.abs() <= ON_SURFACE * size * gradient.length() {
+        if omega.abs() <= negligible(ON_SURFACE, size, least) * gradient.length() {
             return sharp(least);
         }
     }
@@ -143,7 +144,7 @@ fn settle(
         if at.distance(start) > size {
             return None;
         }
-        if step.length() <= ON_SURFACE * size {
+        if step.length() <= negligible(ON_SURFACE, size, at) {
             return Some((at, unit(-gradient)?));
         }
     }
