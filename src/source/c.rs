@@ -112,6 +112,19 @@ impl CFile<'_> {
         Names { prefix: self.file.prefix }
     }
 
+    /// What a header says of the last bits of values.
+    pub(super) fn bits(&self) -> &'static [&'static str] {
+        match self.file.options.math {
+            Math::System => &[
+                "The values have the bits of rfm, except where sin, exp and the like of <math.h> are called: their",
+                "last bits differ between systems.",
+            ],
+            Math::Rfm => &[
+                "The values have the bits of rfm. Functions such as rfm_math_sin are in the C library of rfm.",
+            ],
+        }
+    }
+
     fn head(&self) -> Vec<String> {
         let mut lines = vec!["/*".to_string()];
         let mut say = |line: &str| lines.push(format!(" * {line}").trim_end().to_string());
@@ -131,19 +144,7 @@ impl CFile<'_> {
                 );
             }
         }
-        match self.file.options.math {
-            Math::System => {
-                say(
-                    "The values have the bits of rfm, except where sin, exp and the like of <math.h> are called: their",
-                );
-                say("last bits differ between systems.");
-            }
-            Math::Rfm => {
-                say(
-                    "The values have the bits of rfm. Functions such as rfm_math_sin are in the C library of rfm.",
-                );
-            }
-        }
+        self.bits().iter().for_each(|line| say(line));
         say("");
         say("A point whose coordinates are not finite has the value NaN. Columns must not overlap.");
         lines.push(" */".into());

@@ -22,9 +22,8 @@ pub(super) fn object_header(file: &File<'_>) -> String {
     let writer = CFile { file, flavour: Flavour::Header };
     let mut lines = vec!["/*".to_string()];
     lines.extend(file.title().iter().map(|line| format!(" * {line}")));
-    lines.push(
-        " * Functions of the object file beside it, with the bits of rfm. Columns must not overlap.".into(),
-    );
+    lines.push(" * Functions of the object file beside it. Columns must not overlap.".into());
+    lines.extend(writer.bits().iter().map(|line| format!(" * {line}")));
     lines.push(" */".into());
     lines.extend(writer.macros());
     lines.extend(writer.params());

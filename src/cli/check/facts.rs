@@ -167,7 +167,9 @@ fn print_solid(solid: &Facts) {
         match coarser == components {
             true => say!("    components  {components} of the solid"),
             false => say!(
-                "    components  {components} of the solid, but {coarser} with {half} cells instead of {cells}"
+                "    components  {components} of the solid, but {coarser} with {half} cells instead of {cells}; \
+                 `rfm mesh --cells {}` counts those of the surface on finer ones",
+                2 * cells
             ),
         }
     }

@@ -34,6 +34,8 @@ pub(super) struct Frames {
     pictures: Option<Pictures>,
     count: usize,
     last_time: f64,
+    /// Time of the last frame that the collections list, s: a frame may fail, or the collections after it.
+    listed_until: Option<f64>,
 }
 
 /// A frame that was saved.
@@ -84,7 +86,16 @@ impl Frames {
             })?;
         }
         let (count, last_time) = (0, 0.0);
-        let mut frames = Self { folder, saved: Vec::new(), write_frames, bodies, pictures, count, last_time };
+        let mut frames = Self {
+            folder,
+            saved: Vec::new(),
+            write_frames,
+            bodies,
+            pictures,
+            count,
+            last_time,
+            listed_until: None,
+        };
         if let Some(checkpoint) = resumed {
             frames.take_up(checkpoint)?;
         }
@@ -158,6 +169,11 @@ impl Frames {
         self.last_time
     }
 
+    /// Time of the last frame that can be found, s; `None` if there is none.
+    pub fn listed_until(&self) -> Option<f64> {
+        self.listed_until
+    }
+
     /// The files that were written, as text.
     pub fn describe(&self) -> String {
         let mut parts = vec!["summary.json".to_string()];
@@ -207,8 +223,9 @@ impl Frames {
         Ok(())
     }
 
-    fn write_collections(&self) -> Result<(), Failure> {
+    fn write_collections(&mut self) -> Result<(), Failure> {
         output::write(&self.folder.join("particles.pvd"), |mut out| sph::write_pvd(&mut out, self.listed()))?;
+        self.listed_until = self.listed().last().map(|(time, _)| time);
         if !self.bodies.move_about() {
             return Ok(());
         }

@@ -275,7 +275,10 @@ impl Recording<'_> {
 
     /// Says what a run that ended early has left.
     fn kept(&self) -> String {
-        let frames = format!("the frames up to {} s are kept", short_time(self.frames.last_time()));
+        let frames = match self.frames.listed_until() {
+            Some(time) => format!("the frames up to {} s are kept", short_time(time)),
+            None => "there are no frames".to_string(),
+        };
         match self.checkpoints.last() {
             Some(path) => format!("{frames}; --resume goes on from `{}`", path.shown()),
             None => format!("{frames}; there is no checkpoint yet"),
