@@ -441,7 +441,13 @@ fn number(name: &str, a: &[&str]) -> Option<Words> {
     let first = a.first().copied().unwrap_or("a");
     let call = |name: &str| format!("{name}({})", if a.is_empty() { "a, b".into() } else { a.join(", ") });
     match name {
-        "log" | "loge" => written("`ln` here, or `log10`", &format!("ln({first})")),
+        "log" | "loge" => {
+            let of_base = match a {
+                [x, base] => format!("ln({x})/ln({base})"),
+                _ => format!("ln({first})"),
+            };
+            written("`ln` here, or `log10`", &of_base)
+        }
         "lg" => written("`log10` here", &format!("log10({first})")),
         "exp2" => written("`^` here", &format!("2^({first})")),
         "fmod" | "rem" => written("`mod` here", &call("mod")),

@@ -82,7 +82,11 @@ fn a_check_ends_early_with_what_it_has() {
         let found = document["solids"].as_array().unwrap();
         for (radius, solid) in (1..).map(f64::from).zip(found) {
             let volume = 4.0 / 3.0 * std::f64::consts::PI * radius.powi(3);
-            assert!((solid["volume"].as_f64().unwrap() / volume - 1.0).abs() < 0.01, "{solid}");
+            // on a busy machine the time may end while one of them is measured
+            match solid["volume"].as_f64() {
+                Some(found) => assert!((found / volume - 1.0).abs() < 0.01, "{solid}"),
+                None => assert!(solid["no_volume"].is_string(), "{solid}"),
+            }
         }
         (found.len(), outcome.stderr)
     };

@@ -15,8 +15,8 @@ const STEPS: usize = 8;
 /// A step this small, in sizes, ends the search, because the next one would be its square.
 const LAST_STEP: f64 = 1e-9;
 
-/// A step this small, relative to the largest coordinate, is rounding: that of a coordinate moves a point by half
-/// as much as its last digit, and ω at a moved solid is off by a few such digits.
+/// A step this small, relative to the largest coordinate, is rounding: coordinates are off by half of a last digit,
+/// and ω of a moved solid by a few. (A formula with larger numbers than its coordinates rounds more.)
 const ROUNDING: f64 = 8.0 * f64::EPSILON;
 
 /// A face turns by less than this between a point and its foot (cosine).
@@ -38,7 +38,7 @@ pub(super) struct FacePoint {
 }
 
 /// A length near `p` that is as good as none: a share of a size, or rounding where that is larger. Far from the
-/// origin no step of Newton's method gets below rounding, so one that waited for it would never end.
+/// origin no step of Newton's method gets below rounding, so a search that waited for it would fail.
 pub(super) fn negligible(share: f64, size: f64, p: DVec3) -> f64 {
     (share * size).max(ROUNDING * p.abs().max_element())
 }

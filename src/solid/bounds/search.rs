@@ -27,6 +27,9 @@ const WORK_OF_SIDE: usize = 200_000;
 /// Nodes of formulas that make a unit of work.
 pub const NODES_PER_WORK: usize = 16;
 
+/// How often a side is looked for, each time in a box of which the longest side is less than half as long.
+const MOST_REPEATS: usize = 4;
+
 /// How close to a point of the solid a side is moved, relative to the longest side, for the given number of
 /// first cells. Most sides reach the first goal within 50 cells; those that touch a thin curved edge would
 /// need thousands.
@@ -107,15 +110,28 @@ pub fn search<S: Shrink>(solid: &S) -> Option<Aabb> {
     // a solid that does not end on one side need not be measured on the others
     let (open, closed): (Vec<Side>, Vec<Side>) = Side::all().partition(|side| side.is_open(&hull));
     for side in open.into_iter().chain(closed) {
-        let faces = Faces { solid, side, hull };
-        let reach;
-        (reach, cells) = faces.find(cells)?;
-        side.set(&mut hull, reach);
+        // what is near enough is a part of the longest side, which may have been far too long
+        for _ in 0..MOST_REPEATS {
+            let longest = longest_side(&hull);
+            let reach;
+            (reach, cells) = Faces { solid, side, hull }.find(cells)?;
+            side.set(&mut hull, reach);
+            let held = cells.iter().fold(Aabb::EMPTY, |held, (space, _)| held.union(space));
+            hull = hull.intersection(&held);
+            if longest_side(&hull) > 0.5 * longest {
+                break;
+            }
+        }
         if side.is_open(&hull) {
             break;
         }
     }
     Some(hull)
+}
+
+/// The longest of the sides of a box that end, 0 if none does.
+fn longest_side(hull: &Aabb) -> f64 {
+    hull.size().to_array().into_iter().filter(|&side| side < OPEN).fold(0.0, f64::max)
 }
 
 /// The search for one side.
@@ -167,8 +183,7 @@ impl<S: Shrink> Faces<'_, S> {
             return 0.0;
         }
         let relative = GOALS.iter().find(|(most, _)| cells < *most).map_or(1e-3, |(_, goal)| *goal);
-        let sides = self.hull.size().to_array().into_iter().filter(|&side| side < OPEN);
-        relative * sides.fold(0.0, f64::max)
+        relative * longest_side(&self.hull)
     }
 
     /// How far out a point of the solid is known in a cell.

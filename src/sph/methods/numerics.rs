@@ -94,7 +94,7 @@ pub(in crate::sph) trait Numerics: Sync {
     /// neighbours by 1 − m: by a half at a wall and by a quarter in an edge, where there are fewer
     /// neighbours. Together they allow 0.57 of (h/2)²/24ν; in tests flows burst beyond 0.8 of it in a box,
     /// and 0.7 in a cylinder. Forces with spin are hardly stiffer than those along lines: motion between neighbours
-    /// dies away with up to 8ν Σ V F, 17ν/a² with a support of 2.2 spacings a, which allows 2.4 times (h/2)²/24ν.
+    /// dies away with up to 8ν Σ V F, which allows 2.0 (support of 3 spacings) to 2.4 times (2.2) as much as (h/2)²/24ν.
     fn viscous_dt(&self, scales: &Scales) -> f64 {
         let part = if scales.sticks { 48.0 } else { 24.0 };
         (0.5 * scales.support_radius).powi(2) * scales.rest_density / (part * scales.viscosity)

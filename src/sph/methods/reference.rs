@@ -33,9 +33,10 @@ pub fn methods_reference() -> String {
 
 /// Which viscous forces a fluid has.
 const VISCOUS_FORCES: &str = "\
-Viscous forces of `wcsph` and `dfsph` take away the turning of each neighbourhood if the kinematic viscosity of the fluid is \
-above a tenth of αhc/20, with the α that damps noise by default. Those of thinner fluids act along the lines between \
-particles, and resist layers that slide along each other by only 0.76 to 0.93 of their viscosity.
+Viscous forces of `wcsph` and `dfsph` act against all relative motion but the turning of each neighbourhood if the \
+kinematic viscosity of the fluid is above a tenth of αhc/20, with the α that damps noise by default, the support \
+radius h and the speed of sound c. Those of thinner fluids act along the lines between particles, and resist layers \
+that slide along each other by only 0.76 to 0.93 of their viscosity.
 ";
 
 /// The section of the [`methods_reference`] about one method.

@@ -405,8 +405,8 @@ impl Boundary {
         coverage
     }
 
-    /// By how much an obstacle's surface turns near a place: half the curl of its velocity, 1/s. Of a body that changes
-    /// its shape only the velocity across the surface is known, and half of its turning.
+    /// By how much an obstacle's surface turns near a place: half the curl of its velocity, 1/s. A body that changes
+    /// its shape tells only its velocity across the surface, and half of its turning.
     pub fn turning(&self, k: usize, p: DVec3, h: f64) -> DVec3 {
         let step = TURNING_STEP * h;
         let velocity = self.velocity_along(k, p);

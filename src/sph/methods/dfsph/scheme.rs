@@ -46,7 +46,8 @@
 //!
 //! Artificial viscosity of rough motion ([`roughness`]) damps the noise of the particles' disorder, which
 //! nothing else would damp in a fluid without viscosity. It acts along the lines between particles, and so does
-//! the laminar viscosity unless it counts ([`SpinViscosity`]). Both conserve momentum and angular momentum.
+//! the laminar viscosity unless it counts ([`SpinViscosity`]). Both conserve momentum, and angular
+//! momentum but for the couples of walls.
 //!
 //! The pressure of a particle is G·ρ²s, because for a pressure that is linear in space the sums give G·∇p (G
 //! = 0.98 in the depth of a fluid that has left the lattice). It is averaged over τ, because the divergence
