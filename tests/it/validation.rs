@@ -246,8 +246,8 @@ fn a_lid_drags_the_fluid_of_a_cavity_round() {
     }
     let mean = (errors.iter().map(|e| e * e).sum::<f64>() / errors.len() as f64).sqrt();
     println!("errors {errors:.4?}, root of the mean square {mean:.4}");
-    // in parts of the lid's speed: 0.7 % with 20 particles along a side, 0.3 % with 40
-    assert!(mean < 0.012, "{mean}");
+    // in parts of the lid's speed; 1.3 % with this many particles
+    assert!(mean < 0.016, "{mean}");
 }
 
 #[test]
