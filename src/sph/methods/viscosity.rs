@@ -19,8 +19,8 @@
 //! Forces along the lines between particles (Monaghan & Gingold 1983) have all of this too, and need two sums over
 //! neighbours less. But they rest on Σ V F·r⊗r⊗r⊗r/r², and layers of particles, as they lie along walls, resist a
 //! shear along them by only 0.76 of the viscosity with a support radius of 2.2 spacings, 0.87 with 2.6 and 0.93
-//! with 3. With the spin it is 1.00 to 1.03 for waves of twenty spacings. (A bent pipe ten spacings wide flowed 19 % too fast with `dfsph`.) They remain for fluids of which the
-//! viscosity hardly matters, see [`ViscousForces`].
+//! with 3. With the spin it is 1.00 to 1.03 for waves of twenty spacings. (A bent pipe ten spacings wide flowed
+//! 19 % too fast with `dfsph`.) They remain for fluids of which the viscosity hardly matters, see [`ViscousForces`].
 
 use fearless_simd::{Simd, SimdFloat};
 use glam::{DMat3, DVec3};
@@ -66,8 +66,8 @@ impl SpinSums<'_> {
 }
 
 impl SpinViscosity {
-    /// Finds the sums for particles with these velocities, m/s, if the viscosity of the fluid
-    /// matters. `wall` tells the friction of the walls near a particle.
+    /// Finds the sums for particles with these velocities, m/s, if the viscosity of the fluid matters. `wall` tells
+    /// the friction of the walls near a particle.
     pub fn find(
         &mut self,
         core: &Core,

@@ -1,9 +1,9 @@
 //! Friction between walls and a viscous fluid, which sticks to them or slips along them. A fluid without
 //! viscosity carries none of this data.
 //!
-//! Viscous forces of thin fluids act along the lines between particles (Monaghan & Gingold 1983): 10ν Σ V (v_ij·r)/r²·∇W. So they
-//! conserve angular momentum, leave a rigid rotation alone, and vanish at a free surface as the stress does
-//! there (Colagrossi et al. 2011). A wall to which the fluid sticks continues the velocity linearly. With s the
+//! Viscous forces of thin fluids act along the lines between particles (Monaghan & Gingold 1983):
+//! 10ν Σ V (v_ij·r)/r²·∇W. So they conserve angular momentum, leave a rigid rotation alone, and vanish at a free
+//! surface as the stress does there (Colagrossi et al. 2011). A wall to which the fluid sticks continues the velocity linearly. With s the
 //! distance along the wall's normal and ρ along the wall, its part is −2ν·v/d times
 //!
 //! ```text
@@ -25,9 +25,9 @@
 //!
 //! Forces less the turning of each neighbourhood ([`ViscousForces::WithSpin`]) need other integrals. Behind a
 //! wall the flow turns as it does before it, and what is left of it is half of the linear velocity. So the part of
-//! the wall is −2ν·v/d times A, and m = ∫_{s>d} s(s − d)·|W'|/r dV is K_n − δA: λ, but for walls in layers. (A curved wall changes neither:
-//! a flow around it bends by the wall's curvature, too, and the wall is farther away beside the normal. The one adds
-//! −H·m·v/d, the other H·λ·v/d.)
+//! the wall is −2ν·v/d times A, and m = ∫_{s>d} s(s − d)·|W'|/r dV is K_n − δA: λ, but for walls in layers. (A
+//! curved wall hardly changes them: a flow around it bends by the wall's curvature, too, and the wall is farther away
+//! beside the normal. The one adds −H·m·v/d, the other H·λ·v/d.)
 //!
 //! The turning of a particle beside a wall is that of its neighbours and of the fluid that continues behind the
 //! wall, with the moment K of the wall (`super::Coverage::tensor`): a slope v/d along the wall there has the

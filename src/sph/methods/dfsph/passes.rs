@@ -249,15 +249,13 @@ pub(super) struct Drag<'a, const LAMINAR: bool, const ARTIFICIAL: bool> {
     pub constants: Constants,
     pub walls: &'a Walls,
     pub velocity: &'a Vectors,
-    /// Kinematic viscosity ν, m²/s.
+    /// Kinematic viscosity ν, m²/s. With the spin it includes the room that a particle has over its volume.
     pub kinematic: f64,
     /// The factor α·h/2·c of the artificial viscosity, m²/s.
     pub artificial: f64,
     pub gravity: DVec3,
     /// Viscous forces that replace those along lines.
     pub spin: Option<SpinSums<'a>>,
-    /// Factor of those: the room that a particle has over its volume.
-    pub room: f64,
     /// Receives the forces of walls, if they are wanted.
     pub reaction: Option<Reaction<'a>>,
 }
@@ -307,12 +305,12 @@ impl<const LAMINAR: bool, const ARTIFICIAL: bool> PairPass<6, 10, 6> for Drag<'_
         let Constants { mass_steepness, rest_density, .. } = self.constants;
         let factor = mass_steepness / rest_density;
         let mut drag = match self.spin {
-            Some(sums) => sums.drag(i, self.room * self.kinematic),
+            Some(sums) => sums.drag(i, self.kinematic),
             None => 10.0 * self.kinematic * factor * DVec3::new(x, y, z),
         };
         if LAMINAR && let Some((wall, _)) = self.walls.near(i) {
             let velocity = self.velocity.get(i);
-            let viscosity = if self.spin.is_some() { self.room * self.kinematic } else { self.kinematic };
+            let viscosity = self.kinematic;
             if let Some(reaction) = &self.reaction {
                 let by_friction = wall.friction.by_walls(drag, velocity, viscosity);
                 let pushed = Pushed { by_friction, velocity, viscosity, ..Pushed::default() };

@@ -366,7 +366,8 @@ impl DivergenceFree {
             let out = [&mut x[..], y, z, &mut smooth.x, &mut smooth.y, &mut smooth.z];
             let (walls, reaction) = (&self.walls, Reaction::of(core, dt));
             let spin = self.viscosity.find(core, velocity, |i| walls.near(i).map(|(wall, _)| wall.friction));
-            let room = if parameters.fills_vessel { room_over_volume(&self.spread) } else { 1.0 };
+            let has_more_room = parameters.fills_vessel && spin.is_some();
+            let kinematic = kinematic * if has_more_room { room_over_volume(&self.spread) } else { 1.0 };
             macro_rules! drag {
                 ($laminar:literal, $artificial:literal) => {{
                     let pass = Drag::<$laminar, $artificial> {
@@ -377,7 +378,6 @@ impl DivergenceFree {
                         artificial,
                         gravity: g,
                         spin,
-                        room,
                         reaction,
                     };
                     core.sum(&pass, fields, out);

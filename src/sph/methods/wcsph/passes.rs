@@ -142,8 +142,8 @@ impl<'a> Rates<'a> {
 
 /// The pass over pairs, with or without laminar viscosity, artificial viscosity and crowding. With f =
 /// (1 − q)³ and d from the neighbour it sums f·(p_j − p_i + Π)·d, f·(v_i − v_j)·d, f·(ρ_j − ρ_i), f·d, f·d²,
-/// W, f·((v_j − v_i)·d)·d/d² (unless viscous forces come with the spin) and W·v_j, where the artificial viscosity Π is that of rough velocities. Without
-/// crowding it sums p_j + p_i instead of p_j − p_i, and omits f·d and f·d².
+/// W, f·((v_j − v_i)·d)·d/d² (unless viscous forces come with the spin) and W·v_j, where the artificial
+/// viscosity Π is that of rough velocities. Without crowding it sums p_j + p_i instead of p_j − p_i, and omits f·d and f·d².
 #[derive(Clone, Copy)]
 pub(super) struct Pairs<'a, const LAMINAR: bool, const ARTIFICIAL: bool, const EVEN: bool>(pub Rates<'a>);
 
