@@ -23,6 +23,9 @@ pub(in crate::sph) trait Behind: Copy + Default {
     /// What is known of a box with bodies in it, whose K add up: everything but the part of K is as for two
     /// walls.
     fn with_moments_of(self, of_box: &Self, bodies: &Self) -> Self;
+
+    /// What is known of this part of the walls.
+    fn in_part(self, part: f64) -> Self;
 }
 
 impl Behind for () {
@@ -35,6 +38,8 @@ impl Behind for () {
     fn of_bodies(_: f64, _: DVec3, _: &Symmetric, _: impl FnOnce() -> DVec3) -> Self {}
 
     fn with_moments_of(self, (): &Self, (): &Self) -> Self {}
+
+    fn in_part(self, _: f64) -> Self {}
 }
 
 /// The directions across walls, and the velocities of walls with the weights that these have in K, across them alone.
@@ -74,5 +79,10 @@ impl Behind for Carried {
 
     fn with_moments_of(self, of_box: &Self, bodies: &Self) -> Self {
         Self { by_spread: of_box.by_spread + bodies.by_spread, ..self }
+    }
+
+    fn in_part(self, part: f64) -> Self {
+        let Self { across, by_part, by_spread } = self;
+        Self { across: part * across, by_part: part * by_part, by_spread: part * by_spread }
     }
 }

@@ -148,6 +148,21 @@ impl<F: Friction, B: Behind> Coverage<F, B> {
         cosine_between(self.gradient, other.gradient)
     }
 
+    /// The coverage by this part of the walls, where they are neither wet nor bare as a whole.
+    pub fn in_part(self, part: f64) -> Self {
+        let Barrier { part: barrier, gradient, sweep } = self.barrier;
+        Self {
+            part: part * self.part,
+            filled: part * self.filled,
+            gradient: part * self.gradient,
+            spread: part * self.spread,
+            sweep: part * self.sweep,
+            barrier: Barrier { part: part * barrier, gradient: part * gradient, sweep: part * sweep },
+            friction: self.friction.in_part(part),
+            behind: self.behind.in_part(part),
+        }
+    }
+
     /// The coverage with another friction.
     pub fn with_friction<G>(self, friction: G) -> Coverage<G, B> {
         let Self { part, filled, gradient, spread, sweep, barrier, friction: _, behind } = self;

@@ -63,6 +63,9 @@ pub(in crate::sph) trait Friction: Copy + Default {
     /// The friction of two walls combined by a rule, which says how their λ combine, and the derivatives by both.
     fn joined(&self, other: &Self, rule: impl Fn(f64, f64) -> (f64, f64, f64)) -> Self;
 
+    /// The friction of this part of the walls.
+    fn in_part(self, part: f64) -> Self;
+
     /// Adds a motion to that of all of these walls: a velocity, m/s, at the particle, and by how much it turns, 1/s.
     fn take_along(&mut self, velocity: DVec3, turning: DVec3);
 
@@ -83,6 +86,8 @@ impl Friction for () {
     fn of_face(_: &Wall, _: &Face, _: &OfFace) -> Self {}
 
     fn joined(&self, (): &Self, _: impl Fn(f64, f64) -> (f64, f64, f64)) -> Self {}
+
+    fn in_part(self, _: f64) -> Self {}
 
     fn take_along(&mut self, _: DVec3, _: DVec3) {}
 
@@ -156,6 +161,19 @@ impl Friction for WallDrag {
             spread: of_self * self.spread + of_other * other.spread,
             arm: of_self * self.arm + of_other * other.arm,
             twist: of_self * self.twist + of_other * other.twist,
+        }
+    }
+
+    fn in_part(self, part: f64) -> Self {
+        Self {
+            tensor: part * self.tensor,
+            beyond: part * self.beyond,
+            slippery: part * self.slippery,
+            haul: part * self.haul,
+            sticky: part * self.sticky,
+            spread: part * self.spread,
+            arm: part * self.arm,
+            twist: part * self.twist,
         }
     }
 

@@ -11,6 +11,12 @@ use super::{
 };
 use crate::{field::Face, geom::Aabb, sph::Slip};
 
+/// A wall of which less than this part is bare counts as covered: maps know λ to some parts in a thousand.
+const LEAST_BARE: f64 = 0.01;
+
+/// A cover of less than this part of a wall is left to the angle between wall and obstacle.
+const LEAST_COVER: f64 = 0.5;
+
 impl Boundary {
     /// The walls of the box as faces before a place, each with the axis that it lies across.
     fn box_faces(&self, p: DVec3) -> impl Iterator<Item = (usize, Face)> {
@@ -25,11 +31,45 @@ impl Boundary {
         })
     }
 
+    /// How much of a wall of the box before a particle counts beside moving obstacles, 0 to 1.
+    ///
+    /// A vessel that moves may have its floor in the wall or before it. What is behind the wall is then the vessel's
+    /// own, and the wall adds nothing. (As two walls, they took too much wherever the vessel's own walls meet, and
+    /// water at rest boiled. Obstacles at rest end at the box, see [`Coverage::with_bodies`].)
+    ///
+    /// An obstacle takes the part b of a ball of the size of a kernel that touches the wall from behind, and a of the
+    /// kernel. Where it crosses the wall, a and b are the same, and where it covers the wall, b is 1. Walls that are
+    /// neither are joined by the angle between them, which takes a partial cover into account.
+    fn bare(&self, wall: &Wall, p: DVec3, face: &Face) -> f64 {
+        if !self.maps.any_moves() {
+            return 1.0;
+        }
+        let behind = p - (face.distance + wall.h) * face.normal;
+        let covered = |k: usize| {
+            let there = self.maps.part_of_moving(k, behind);
+            if there <= LEAST_COVER {
+                return 0.0;
+            }
+            let here = self.maps.part_of_moving(k, p);
+            let more = if here < there { (there - here) / (1.0 - here) } else { 0.0 };
+            ((more - LEAST_COVER) / (1.0 - LEAST_COVER)).clamp(0.0, 1.0)
+        };
+        let bare: f64 = self.broad_phase.at(p).map(|k| 1.0 - covered(k)).product();
+        if bare < LEAST_BARE { 0.0 } else { bare }
+    }
+
     /// What the walls of the box take of the kernel of a particle.
     pub(super) fn of_box<F: Friction, B: Behind>(&self, wall: &Wall, p: DVec3) -> Coverage<F, B> {
         let mut whole = Coverage::<F, B>::default();
         for (_, face) in self.box_faces(p).filter(|(_, face)| face.distance < wall.h) {
-            let face = Coverage::of_face(wall, &face);
+            let bare = self.bare(wall, p, &face);
+            if bare == 0.0 {
+                continue;
+            }
+            let mut face = Coverage::of_face(wall, &face);
+            if bare < 1.0 {
+                face = face.in_part(bare);
+            }
             // most particles near walls have one wall near them
             if whole.part == 0.0 {
                 whole = face;
@@ -52,7 +92,7 @@ impl Boundary {
             let hidden = self.broad_phase.at(p).any(|k| self.field(k).omega(before) >= 0.0);
             if !hidden {
                 let tensor = Coverage::<()>::of_face(wall, &face).tensor().to_matrix();
-                moments[axis] += face.normal.dot(tensor * face.normal);
+                moments[axis] += self.bare(wall, p, &face) * face.normal.dot(tensor * face.normal);
             }
         }
         moments

@@ -169,6 +169,25 @@ impl Maps {
         self.at_rest.as_ref().map_or(0, VolumeMap::bytes) + self.bodies.iter().map(of_body).sum::<usize>()
     }
 
+    /// Whether any body moves without changing its shape.
+    pub fn any_moves(&self) -> bool {
+        self.bodies.iter().any(|body| matches!(body, Body::Whole(_) | Body::Parts(_)))
+    }
+
+    /// The part of the kernel at any place that an obstacle takes which moves without changing its shape; 0 if it does
+    /// not, or if that is not known there.
+    pub fn part_of_moving(&self, k: usize, p: DVec3) -> f64 {
+        let part = |rigid: &Rigid| match rigid.at(p) {
+            Known::Taken(taken) => taken.part,
+            Known::AtRest | Known::Changing(_) | Known::Parts(_) | Known::Nothing | Known::ByFaces => 0.0,
+        };
+        match self.bodies.get(k) {
+            Some(Body::Whole(whole)) => part(whole),
+            Some(Body::Parts(parts)) => parts.iter().map(part).sum::<f64>().min(1.0),
+            Some(Body::AtRest | Body::Changing(_) | Body::Unknown) | None => 0.0,
+        }
+    }
+
     /// What the obstacles at rest take of the kernel at a place in the box.
     pub fn at_rest(&self, p: DVec3) -> Option<Taken> {
         self.at_rest.as_ref()?.at(p)
