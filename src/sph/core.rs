@@ -68,6 +68,8 @@ pub(super) struct Core {
     clear: Vec<f64>,
     /// Whether a wall may be near one of [`MARKED`] particles, see [`Boundary::mark`].
     near_walls: Vec<bool>,
+    /// The part of the walls near each particle that is wet, 0 to 1; empty if all are. Sorting forgets it.
+    pub wet: Vec<f64>,
     /// Working memory: the targets of the particles before they collide, or a vector that a method needs.
     pub spare: Vectors,
     sorted_id: Vec<u32>,
@@ -105,6 +107,7 @@ impl Core {
             near_is_known: false,
             clear,
             near_walls: Vec::new(),
+            wet: Vec::new(),
             spare: Vectors::default(),
             sorted_id: Vec::new(),
         }
@@ -183,6 +186,7 @@ impl Core {
             let Self { boundary, particles, near_walls, .. } = self;
             boundary.mark(&particles.position, self.parameters.support_radius, near_walls);
         }
+        self.wet.clear();
     }
 
     /// What walls take of the kernel of a particle; `None` if they are farther away than the support radius.
@@ -193,7 +197,18 @@ impl Core {
     /// What walls take of the kernel of a particle, with what is known of the motion behind them if B asks for it.
     pub fn coverage_with<F: Friction, B: Behind>(&self, i: usize) -> Option<Coverage<F, B>> {
         let near = self.near_walls[i / MARKED];
-        near.then(|| self.boundary.coverage(&self.wall, self.particles.position.get(i)))?
+        let whole = near.then(|| self.boundary.coverage(&self.wall, self.particles.position.get(i)))??;
+        Some(match self.wet.get(i) {
+            Some(&wet) if wet < 1.0 => whole.in_part(wet),
+            Some(_) | None => whole,
+        })
+    }
+
+    /// What walls that are wet as a whole take of the kernel of a particle, as continuous walls. `None` if none is near.
+    pub fn coverage_by_whole_walls(&self, i: usize) -> Option<Coverage> {
+        let near = self.near_walls[i / MARKED];
+        let plain = Wall { layer: None, ..self.wall };
+        near.then(|| self.boundary.coverage(&plain, self.particles.position.get(i)))?
     }
 
     /// How walls enter the sums of the method.
@@ -390,6 +405,7 @@ impl Core {
         let vectors = [position, velocity, &self.acceleration, &self.spare].map(Vectors::bytes);
         vectors.iter().sum::<usize>()
             + 8 * (density.capacity() + pressure.capacity() + self.clear.capacity())
+            + 8 * self.wet.capacity()
             + self.near_walls.capacity()
             + 4 * (id.capacity() + self.sorted_id.capacity())
             + self.columns.bytes()

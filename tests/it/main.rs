@@ -14,6 +14,7 @@ mod diagnostics;
 mod distance;
 mod documents;
 mod driven;
+mod drops;
 mod editors;
 mod examples;
 mod files;

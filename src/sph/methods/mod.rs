@@ -20,10 +20,10 @@ macro_rules! for_all_methods {
     };
 }
 
+mod bodies_of_fluid;
 mod crowding;
 mod declaration;
 mod dfsph;
-mod free_bodies;
 mod free_surface;
 mod near_walls;
 mod negative_pressure;
@@ -37,6 +37,7 @@ mod start;
 mod tension;
 mod viscosity;
 mod wcsph;
+mod wetting;
 
 pub use declaration::{FluidDefaults, KeyBlock, KeyInfo, KeyReader, MethodInfo, Support};
 pub use dfsph::Dfsph;

@@ -12,14 +12,22 @@
 //! tangential moment Σ V c f·½(r² − (r·n̂)²). This is exact where the normals turn evenly. (Sirotkin & Yoh
 //! 2012 renormalise the full matrix.)
 //!
-//! Walls count as fluid: a surface meets a wall at a right angle. The forces on a body of fluid that touches
-//! no wall have neither a resultant nor a torque ([`free_bodies`]).
+//! A surface meets a wall at a right angle: for n̂ and κ the fluid has an image in the wall ([`super::wetting`]).
+//! In n, which is what a pressure acts on as well, it is the wet part of the wall that counts. (With the whole wall, which
+//! goes on beside a drop as well as below it, drops spread until they were a layer thin, and fell apart.) Beside a wall
+//! the tension acts along it: what it has across it, by the noise of n, would press particles into the wall.
+//!
+//! The forces on a body of fluid that touches no wall have neither a resultant nor a torque, and those on one that
+//! does move it along none of its walls ([`bodies_of_fluid`]).
 
 use fearless_simd::{Simd, SimdFloat};
 use glam::DVec3;
 
-use super::crowding::Crowding;
-use super::free_bodies;
+use super::{
+    bodies_of_fluid,
+    crowding::Crowding,
+    wetting::{Wetting, from_image},
+};
 use crate::sph::{
     core::Core,
     pairs::{PairPass, Real},
@@ -44,9 +52,17 @@ pub(super) struct Tension {
     /// Normals n, 1/m.
     normal: Vectors,
     force: Vectors,
+    wetting: Wetting,
 }
 
 impl Tension {
+    /// Finds which walls are wet, once the particles are sorted, if the fluid is under tension.
+    pub fn find_wet_walls(&mut self, core: &mut Core) {
+        if core.parameters.surface_tension != 0.0 {
+            self.wetting.find(core);
+        }
+    }
+
     /// Adds the accelerations by surface tension, if the fluid has any.
     pub fn act(&mut self, core: &mut Core) {
         let parameters = &core.parameters;
@@ -60,30 +76,49 @@ impl Tension {
         self.weight.resize(n, 0.0);
         let crowding = Crowding::of(parameters);
 
-        let pass = Normals { crowding, core };
+        let images = self.wetting.any().then(|| self.wetting.planes());
+
+        let pass = Normals { crowding, core, wetting: &self.wetting };
         let (Vectors { x, y, z }, Vectors { x: dx, y: dy, z: dz }) = (&mut self.normal, &mut self.direction);
-        core.sum(&pass, [], [x, y, z, dx, dy, dz, &mut self.weight]);
+        let out = [&mut x[..], y, z, dx, dy, dz, &mut self.weight];
+        match images {
+            Some(planes) => core.sum(&WithImages(pass), planes, out),
+            None => core.sum(&pass, [], out),
+        }
 
         let pass = Curvature { crowding, parameters, normal: &self.normal, weight: &self.weight };
         let Vectors { x: dx, y: dy, z: dz } = &self.direction;
         let Vectors { x, y, z } = &mut self.force;
-        core.sum(&pass, [&dx[..], dy, dz, &self.weight], [x, y, z]);
+        let (direction, out) = ([&dx[..], dy, dz, &self.weight], [&mut x[..], y, z]);
+        match images {
+            Some([x, y, z, distance]) => {
+                let [dx, dy, dz, weight] = direction;
+                core.sum(&WithImages(pass), [dx, dy, dz, weight, x, y, z, distance], out);
+            }
+            None => core.sum(&pass, direction, out),
+        }
 
-        free_bodies::balance(core, &mut self.force, &self.weight);
+        bodies_of_fluid::balance(core, &self.wetting, &mut self.force, &self.weight);
         add_scaled(&mut core.acceleration, &self.force, 1.0);
     }
 
     pub fn bytes(&self) -> usize {
         [&self.direction, &self.normal, &self.force].map(Vectors::bytes).iter().sum::<usize>()
             + 8 * self.weight.capacity()
+            + self.wetting.bytes()
     }
 }
+
+/// A pass that counts the image of each neighbour, too.
+#[derive(Clone, Copy)]
+struct WithImages<P>(P);
 
 /// Finds n, n̂ and its weight.
 #[derive(Clone, Copy)]
 struct Normals<'a> {
     crowding: Crowding,
     core: &'a Core,
+    wetting: &'a Wetting,
 }
 
 impl PairPass<0, 3, 7> for Normals<'_> {
@@ -99,16 +134,53 @@ impl PairPass<0, 3, 7> for Normals<'_> {
         self.crowding.add(d, r2, sums);
     }
 
-    fn finish(&self, i: usize, sums: [f64; 3]) -> [f64; 7] {
-        let mut normal = self.crowding.total(sums);
-        if let Some(wall) = self.core.coverage::<()>(i) {
-            normal += wall.gradient;
-        }
-        let length = normal.length();
+    fn finish(&self, _: usize, sums: [f64; 3]) -> [f64; 7] {
+        let normal = self.crowding.total(sums);
+        self.results(normal, normal)
+    }
+}
+
+impl Normals<'_> {
+    /// The results of a particle: n, n̂ along another vector, and its weight.
+    fn results(&self, normal: DVec3, along: DVec3) -> [f64; 7] {
         let [none, full] = NORMAL;
-        let weight = ((length * self.crowding.kernel.h - none) / (full - none)).clamp(0.0, 1.0);
-        let direction = if weight > 0.0 { normal / length } else { DVec3::ZERO };
+        let weight = ((normal.length() * self.crowding.kernel.h - none) / (full - none)).clamp(0.0, 1.0);
+        let direction = if weight > 0.0 { along.normalize_or_zero() } else { DVec3::ZERO };
         [normal.x, normal.y, normal.z, direction.x, direction.y, direction.z, weight]
+    }
+}
+
+impl PairPass<4, 6, 7> for WithImages<Normals<'_>> {
+    #[inline(always)]
+    fn add<S: Simd, V: SimdFloat<S, Element: Real>>(
+        &self,
+        d: [V; 3],
+        r2: V,
+        plane: &[V; 4],
+        _: [V; 4],
+        [fx, fy, fz, ix, iy, iz]: &mut [V; 6],
+    ) {
+        let crowding = self.0.crowding;
+        let (mut fluid, mut image) = ([*fx, *fy, *fz], [*ix, *iy, *iz]);
+        crowding.add(d, r2, &mut fluid);
+        let (d, r2) = from_image(plane, d, r2);
+        crowding.add(d, r2, &mut image);
+        ([*fx, *fy, *fz], [*ix, *iy, *iz]) = (fluid, image);
+    }
+
+    fn finish(&self, i: usize, [fx, fy, fz, ix, iy, iz]: [f64; 6]) -> [f64; 7] {
+        let Normals { crowding, core, wetting } = self.0;
+        let fluid = crowding.total([fx, fy, fz]);
+        match (core.coverage::<()>(i), wetting.plane(i)) {
+            (Some(wall), Some(plane)) => {
+                let normal = fluid + wall.gradient;
+                // a layer at rest lies half a spacing from its wall, and the next one is free
+                let free = (plane.distance / core.parameters.spacing() - 0.5).clamp(0.0, 1.0);
+                let across = (1.0 - free) * normal.dot(plane.normal) * plane.normal;
+                self.0.results(normal - across, fluid + crowding.total([ix, iy, iz]))
+            }
+            (None, _) | (_, None) => self.0.results(fluid, fluid),
+        }
     }
 }
 
@@ -131,14 +203,7 @@ impl PairPass<4, 2, 3> for Curvature<'_> {
         other: [V; 4],
         sums: &mut [V; 2],
     ) {
-        let s = self.crowding.kernel.nearness(r2);
-        let f = s * s * s * other[3];
-        let turn = (other[0] - own[0]) * d[0];
-        let turn = (other[1] - own[1]).mul_add(d[1], turn);
-        let turn = (other[2] - own[2]).mul_add(d[2], turn);
-        let along = own[2].mul_add(d[2], own[1].mul_add(d[1], own[0] * d[0]));
-        sums[0] = f.mul_add(turn, sums[0]);
-        sums[1] = f.mul_add(r2 - along * along, sums[1]);
+        self.bend(d, r2, own, other, sums);
     }
 
     fn finish(&self, i: usize, [turn, moment]: [f64; 2]) -> [f64; 3] {
@@ -151,5 +216,51 @@ impl PairPass<4, 2, 3> for Curvature<'_> {
         let curvature = self.crowding.steepness * turn / moment;
         let Parameters { surface_tension, rest_density, .. } = *self.parameters;
         (2.0 * surface_tension / rest_density * self.weight[i] * curvature * normal).to_array()
+    }
+}
+
+impl Curvature<'_> {
+    /// Adds a neighbour with the direction n̂ and its weight.
+    #[inline(always)]
+    fn bend<S: Simd, V: SimdFloat<S, Element: Real>>(
+        &self,
+        d: [V; 3],
+        r2: V,
+        own: &[V; 4],
+        other: [V; 4],
+        sums: &mut [V; 2],
+    ) {
+        let s = self.crowding.kernel.nearness(r2);
+        let f = s * s * s * other[3];
+        let turn = (other[0] - own[0]) * d[0];
+        let turn = (other[1] - own[1]).mul_add(d[1], turn);
+        let turn = (other[2] - own[2]).mul_add(d[2], turn);
+        let along = own[2].mul_add(d[2], own[1].mul_add(d[1], own[0] * d[0]));
+        sums[0] = f.mul_add(turn, sums[0]);
+        sums[1] = f.mul_add(r2 - along * along, sums[1]);
+    }
+}
+
+impl PairPass<8, 2, 3> for WithImages<Curvature<'_>> {
+    #[inline(always)]
+    fn add<S: Simd, V: SimdFloat<S, Element: Real>>(
+        &self,
+        d: [V; 3],
+        r2: V,
+        &[dx, dy, dz, weight, x, y, z, distance]: &[V; 8],
+        [ox, oy, oz, other_weight, ..]: [V; 8],
+        sums: &mut [V; 2],
+    ) {
+        let own = [dx, dy, dz, weight];
+        self.0.bend(d, r2, &own, [ox, oy, oz, other_weight], sums);
+        let (d, r2) = from_image(&[x, y, z, distance], d, r2);
+        let across = z.mul_add(oz, y.mul_add(oy, x * ox));
+        let twice = across + across;
+        let image = [ox - twice * x, oy - twice * y, oz - twice * z, other_weight];
+        self.0.bend(d, r2, &own, image, sums);
+    }
+
+    fn finish(&self, i: usize, sums: [f64; 2]) -> [f64; 3] {
+        self.0.finish(i, sums)
     }
 }

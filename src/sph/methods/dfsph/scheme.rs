@@ -333,6 +333,7 @@ impl DivergenceFree {
         columns.extend(kept.iter_mut().map(|column| &mut **column));
         core.sort(&mut columns);
         core.find_near();
+        self.tension.find_wet_walls(core);
         self.walls.find(core);
         let mut density = std::mem::take(&mut core.particles.density);
         let (constants, walls) = (Constants::of(&core.parameters), &self.walls);

@@ -243,6 +243,7 @@ impl Weakly {
             walls: NearWalls::default(),
         };
         core.sort(&mut scheme.roughness.columns());
+        scheme.tension.find_wet_walls(core);
         scheme.find_rates(core, 0.0);
         scheme.find_pressure(core, 0.0);
         scheme
@@ -256,6 +257,7 @@ impl Weakly {
         columns.extend(self.roughness.columns());
         columns.extend(self.common.iter_mut().flat_map(Common::columns));
         core.sort(&mut columns);
+        self.tension.find_wet_walls(core);
     }
 
     /// Finds the pressures of the densities, and the greatest speed of sound after a step of the length `dt`.

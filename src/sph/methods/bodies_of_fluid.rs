@@ -1,4 +1,4 @@
-//! Bodies of fluid that touch no wall, as drops and jets do, and the balance of the forces within them.
+//! Bodies of fluid, as drops and jets are, and the balance of the forces within them.
 //!
 //! The tension of a closed surface has no resultant and no torque, ∮ κ n dA = 0 and ∮ x × κ n dA = 0. A sum
 //! over particles has both, so a round drop would set itself in motion and begin to spin. Among all changes
@@ -6,23 +6,41 @@
 //! surface, is a rigid acceleration w·(α + β × (x − c)). It is a small part of the force, for each body on
 //! its own.
 //!
+//! A surface that meets walls at a right angle keeps its area where the body slides along them as a rigid one:
+//! along a plane and about its normal, about the centre of a sphere, along the edge of a corner and a tube. So the
+//! tension does no work there, and only such motions are removed from its forces on a body that touches walls. They
+//! are those (α, β) for which α + β × (x − c) has no part along the normals m of the walls:
+//!
+//! ```text
+//! (M + ρQ)·(α, β) = Σ (f, (x − c) × f)        M = Σ w J Jᵀ,  Q = Σ λ g gᵀ,  g = (m, (x − c) × m)
+//! ```
+//!
+//! with a ρ so large that what Q holds is left alone.
+//!
 //! Two particles belong to one body if their cells in a grid with the support radius as spacing touch. So
 //! bodies that approach each other count as one slightly too early.
 
 use std::collections::HashMap;
 
 use glam::{DMat3, DVec3};
+use nalgebra::{Cholesky, Matrix3, Matrix6, Vector3, Vector6};
 
+use super::wetting::{Plane, Wetting};
 use crate::sph::{core::Core, particles::Vectors};
 
 /// A body that is as flat as a line, by the determinant of its moment of inertia over the cube of its trace,
 /// has no axis of its own.
 const LEAST_ROUND: f64 = 1e-6;
 
+/// ρ. Normals of walls are known to a hundredth, which must not hold a body.
+const HOLD: f64 = 1e4;
+
 /// A body of fluid.
 #[derive(Clone, Copy, Default)]
 struct Body {
     touches_wall: bool,
+    /// Q, with lengths in units of m.
+    held: Matrix6<f64>,
     /// Σ w.
     weight: f64,
     /// Σ w·x, and with that the centre c.
@@ -35,15 +53,15 @@ struct Body {
     inertia: DMat3,
 }
 
-/// Removes the resultant and the torque from the forces on bodies that touch no wall. `force` holds the force
-/// of each particle over its mass, `weight` how far it belongs to the surface.
-pub(super) fn balance(core: &Core, force: &mut Vectors, weight: &[f64]) {
+/// Removes the resultant and the torque from the forces on bodies, as far as no wall holds them. `force` holds the
+/// force of each particle over its mass, `weight` how far it belongs to the surface.
+pub(super) fn balance(core: &Core, wetting: &Wetting, force: &mut Vectors, weight: &[f64]) {
     let (of, count) = bodies(core);
     let mut bodies = vec![Body::default(); count];
     let position = &core.particles.position;
     for (i, &k) in of.iter().enumerate() {
         let body = &mut bodies[k];
-        body.touches_wall = body.touches_wall || core.coverage::<()>(i).is_some();
+        body.touches_wall = body.touches_wall || wetting.plane(i).is_some();
         body.weight += weight[i];
         body.centre += weight[i] * position.get(i);
         body.force += force.get(i);
@@ -58,18 +76,52 @@ pub(super) fn balance(core: &Core, force: &mut Vectors, weight: &[f64]) {
         body.torque += away.cross(force.get(i));
         let square = DMat3::from_cols(away * away.x, away * away.y, away * away.z);
         body.inertia += weight[i] * (DMat3::from_diagonal(DVec3::splat(away.length_squared())) - square);
+        if let Some(Plane { normal, filled, .. }) = wetting.plane(i) {
+            let turn = away.cross(*normal);
+            let along = Vector6::new(normal.x, normal.y, normal.z, turn.x, turn.y, turn.z);
+            body.held += *filled * along * along.transpose();
+        }
     }
     for body in &mut bodies {
+        if body.touches_wall {
+            (body.force, body.torque) = body.slide().unwrap_or_default();
+            continue;
+        }
         let trace = body.inertia.x_axis.x + body.inertia.y_axis.y + body.inertia.z_axis.z;
         let is_round = body.inertia.determinant() > LEAST_ROUND * trace.powi(3);
         body.torque = if is_round { body.inertia.inverse() * body.torque } else { DVec3::ZERO };
     }
     for (i, &k) in of.iter().enumerate() {
         let body = &bodies[k];
-        if body.weight > 0.0 && !body.touches_wall {
+        if body.weight > 0.0 {
             let rigid = body.force + body.torque.cross(position.get(i) - body.centre);
             force.set(i, force.get(i) - weight[i] * rigid);
         }
+    }
+}
+
+impl Body {
+    /// α and β of a body that touches walls, from its force over its weight and its torque. `None` if they cannot be
+    /// told, as for a body of one particle.
+    fn slide(&self) -> Option<(DVec3, DVec3)> {
+        let trace = self.inertia.x_axis.x + self.inertia.y_axis.y + self.inertia.z_axis.z;
+        // the radius of gyration makes lengths of angles
+        let radius = (0.5 * trace / self.weight).sqrt();
+        let lengths = Vector6::new(1.0, 1.0, 1.0, 1.0 / radius, 1.0 / radius, 1.0 / radius);
+        let mut moments = HOLD * self.held;
+        let inertia = Matrix3::from_column_slice(&self.inertia.to_cols_array());
+        let mut turns = moments.fixed_view_mut::<3, 3>(3, 3);
+        turns += inertia;
+        for k in 0..3 {
+            moments[(k, k)] += self.weight;
+        }
+        let scaled = Matrix6::from_diagonal(&lengths) * moments * Matrix6::from_diagonal(&lengths);
+        let (force, torque) = (self.weight * self.force, self.torque);
+        let loads = Vector6::new(force.x, force.y, force.z, torque.x, torque.y, torque.z);
+        let motion = Cholesky::new(scaled)?.solve(&loads.component_mul(&lengths)).component_mul(&lengths);
+        let of = |k: usize| DVec3::from_array(Vector3::from(motion.fixed_rows::<3>(k)).into());
+        let (translation, rotation) = (of(0), of(3));
+        (translation.is_finite() && rotation.is_finite()).then_some((translation, rotation))
     }
 }
 
