@@ -3,7 +3,7 @@
 use super::lowering::Lowering;
 use crate::diagnostic::Span;
 use crate::geom::Aabb;
-use crate::ir::{self, Binary, Given, Graph, Interpreter, Node, Unary};
+use crate::ir::{self, Binary, Expr, Given, Graph, Interpreter, Node, Unary};
 
 /// How many places a part is looked at to find what its slope is like.
 const PLACES: u32 = 48;
@@ -19,9 +19,9 @@ const ROUNDING: f64 = 1e-10;
 enum Profile {
     /// g is this number everywhere: ω/g.
     Linear(f64),
-    /// ω is a square of distances, so that g² − 2ω·∂²ω/∂n² is the square of this number everywhere, which is g on the
+    /// ω is a square of distances, so that g² − 2ω·∂²ω/∂n² is the square of a number everywhere, which is g on the
     /// surface: 2ω/(g + the number).
-    Quadratic(f64),
+    Quadratic { at_surface: f64, second: Option<f64> },
     /// Something else.
     Other,
 }
@@ -45,15 +45,38 @@ impl Lowering<'_> {
                 let slope = self.constant(slope);
                 Some(self.binary(Binary::Div, leaf, slope, span))
             }
-            Profile::Quadratic(at_surface) => {
+            Profile::Quadratic { at_surface, second } => {
                 let at_surface = self.constant(if is_one(at_surface) { 1.0 } else { at_surface });
                 let slope = self.slope_of_leaf(leaf, span);
+                if let Some(second) = second.filter(|second| *second < 0.0 && self.divides(slope)) {
+                    return Some(self.distance_by_root(leaf, at_surface, second, span));
+                }
                 let sum = self.binary(Binary::Add, slope, at_surface, span);
                 let twice = self.binary(Binary::Add, leaf, leaf, span);
                 Some(self.binary(Binary::Div, twice, sum, span))
             }
             Profile::Other => None,
         }
+    }
+
+    /// (k − √(k² + 2cω))/−c, where k is the slope on the surface and c = ∂²ω/∂n² is the same everywhere. It is
+    /// 2ω/(g + k) without g, of which no range is known where it divides by what may be zero, as on the axis of a torus.
+    fn distance_by_root(&mut self, leaf: Node, at_surface: Node, second: f64, span: Span) -> Node {
+        let [zero, twice, curved] = [0.0, 2.0 * second, -second].map(|number| self.constant(number));
+        let square = self.binary(Binary::Mul, at_surface, at_surface, span);
+        let bent = self.binary(Binary::Mul, leaf, twice, span);
+        let sum = self.binary(Binary::Add, square, bent, span);
+        let sum = self.binary(Binary::Max, sum, zero, span);
+        let slope = self.unary(Unary::Sqrt, sum, span);
+        let difference = self.binary(Binary::Sub, at_surface, slope, span);
+        self.binary(Binary::Div, difference, curved, span)
+    }
+
+    /// Whether a formula divides by something that may be zero.
+    fn divides(&self, formula: Node) -> bool {
+        let graph = &self.module.graph;
+        let is_quotient = |node: &Node| matches!(graph.expr(*node), Expr::Binary(Binary::DivOrZero, ..));
+        graph.cone(formula).iter().any(is_quotient)
     }
 
     /// |∇ω|, without the directions in which ω does not change.
@@ -99,16 +122,19 @@ impl Lowering<'_> {
         if first.square > 0.0 && found.iter().all(is_same) {
             // the one with the least rounding
             let best = found.iter().min_by(|a, b| a.terms.total_cmp(&b.terms)).unwrap_or(&first);
-            return Profile::Quadratic(best.square.sqrt());
+            let has_same = |at: &Slope| (at.second - best.second).abs() <= 1e-8 * best.second.abs();
+            let second = found.iter().all(has_same).then_some(best.second);
+            return Profile::Quadratic { at_surface: best.square.sqrt(), second };
         }
         Profile::Other
     }
 }
 
-/// The figures of a field at a place: g, g² − 2ω·∂²ω/∂n², and the sizes of both terms together.
+/// The figures of a field at a place: g, ∂²ω/∂n², g² − 2ω·∂²ω/∂n², and the sizes of both terms together.
 #[derive(Debug, Clone, Copy)]
 struct Slope {
     slope: f64,
+    second: f64,
     square: f64,
     terms: f64,
 }
@@ -133,9 +159,9 @@ impl Slopes {
         let mut out = [0.0; 8];
         self.0.eval_given(Given { point, time, parameters, uniforms: &[] }, &mut out);
         let [omega, slope, x, y, z, a, b, c] = out;
-        let along = (x * a + y * b + z * c) / slope;
-        let bent = 2.0 * omega * along;
-        let found = Slope { slope, square: slope * slope - bent, terms: slope * slope + bent.abs() };
+        let second = (x * a + y * b + z * c) / slope;
+        let bent = 2.0 * omega * second;
+        let found = Slope { slope, second, square: slope * slope - bent, terms: slope * slope + bent.abs() };
         (slope > 0.0 && found.terms.is_finite()).then_some(found)
     }
 }

@@ -2,7 +2,7 @@
 //! against the definition.
 
 use rfm::geom::Aabb;
-use rfm::glam::DVec3;
+use rfm::glam::{DVec2, DVec3};
 use rfm::solid::Bounds;
 use rfm::{Engine, Program, Solid};
 
@@ -250,6 +250,66 @@ fn joints_differ_from_the_plain_ones_near_the_edge_only() {
         ),
     ] {
         same_sign(joint, plain, cube(1.5));
+    }
+}
+
+/// The legs of a chamfer, and the ends of the arc of a fillet, on a post that stands on a plate, along both.
+#[test]
+fn the_width_of_a_joint_is_a_length() {
+    let (post, plate) = ("cylinder(0.3, 1).move([0, 0, -0.5])", "box([-1, -1, -1], [1, 1, 0])");
+    for r in [0.02, 0.1, 0.2] {
+        // in planes through the axis the surfaces are straight and at a right angle
+        let arc = |s: f64| r - (r * r - (r - s).powi(2)).sqrt();
+        for (joint, known) in
+            [("chamfer", &(|s: f64| r - s) as &dyn Fn(f64) -> f64), ("blend", &arc as &dyn Fn(f64) -> f64)]
+        {
+            for [a, b] in [[post, plate], [plate, post]] {
+                let joined = solid(&format!("{joint}({a}, {b}, {r})"));
+                for s in [1e-6, 0.3 * r, 0.8 * r] {
+                    let (along_plate, along_post) =
+                        (DVec3::new(0.29, 0.0, s), DVec3::new(0.3 + s, 0.0, -0.01));
+                    let legs = [
+                        end_of(&joined, along_plate, DVec3::X, 0.5) - 0.01,
+                        end_of(&joined, along_post, DVec3::Z, 0.4) - 0.01,
+                    ];
+                    for leg in legs {
+                        assert!(
+                            (leg - known(s)).abs() <= 1e-9,
+                            "{joint} {r} at {s}: {leg}, not {}",
+                            known(s)
+                        );
+                    }
+                }
+                // beyond the joint nothing changes
+                let plain = solid(&format!("{a} or {b}"));
+                for p in places(5000, cube(1.2)) {
+                    let is_at_joint = p.z >= 0.0 && p.truncate().length() < 0.3 + r && p.z < r;
+                    assert!(
+                        is_at_joint || (joined.omega(p) > 0.0) == (plain.omega(p) > 0.0),
+                        "{joint} {r}: {p}"
+                    );
+                }
+            }
+        }
+    }
+}
+
+/// Distances from a torus are known, and their bounds are found, so those of joints are.
+#[test]
+fn joints_with_a_torus_have_bounds() {
+    for definition in [
+        "torus(1, 0.2).distance()",
+        "torus(1, 0.2).round(0.05)",
+        "blend(torus(1, 0.2), cylinder(0.1, 1), 0.1)",
+    ] {
+        let Bounds::Within(bounds) = *solid(definition).bounds() else { panic!("{definition}") };
+        assert!(cube(1.25).union(&bounds) == cube(1.25), "{definition}: {bounds:?}");
+    }
+    let ring = solid("torus(1, 0.2).rotate_x(30°).scale(2).distance()");
+    for p in places(2000, cube(3.0)) {
+        let turned = DVec2::from_angle(-30_f64.to_radians()).rotate(DVec2::new(p.y, p.z));
+        let expected = 0.4 - (p.x.hypot(turned.x) - 2.0).hypot(turned.y);
+        assert!((ring.omega(p) - expected).abs() < 1e-12, "{p}");
     }
 }
 
