@@ -287,6 +287,14 @@ thick as that length.
 SPINDLE = "W0423":
 "`torus(R, r)` has a ring with the radius R and a section with the radius r. If r is larger than R it cuts itself along the axis:
 it has no hole, and looks like an apple. Most often the two are exchanged: `torus(1, 0.2)` is a slender ring.";
+THIN_FOR_EDGES = "W0424":
+"`.round(r)` makes arcs of the edges of a shape, and a part that is thinner than 2r has no room for two of them. It ends in the
+middle of its thickness T by r − √(r² − (r − T/2)²) short of where it ended. A part that is so thin in one direction keeps its faces; one
+that is so thin in all directions keeps none and becomes smaller: a cube of 1 m with `.round(0.6)` is 0.97 m wide, with `.round(0.8)`
+0.76 m.
+
+    rfm 1
+    solid plate = box([0, 0, 0], [4, 3, 0.2]).round(0.15)    # 0.2 thick: a radius of 0.1 keeps its length";
 FLUID_IN_OBSTACLE = "W0501":
 "Part of the fluid's shape lies inside an obstacle, or outside the box or the container. Those particles are carved off before the
 run starts. `rfm run` counts them. `rfm check` and editors estimate by samples how much of the shape is taken, and tell of it where

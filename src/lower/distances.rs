@@ -14,6 +14,13 @@ const FEWEST_PLACES: usize = 16;
 /// What counts as rounding, relative to the terms of a sum.
 const ROUNDING: f64 = 1e-10;
 
+/// The distance from the surface of a formula.
+pub(super) struct Known {
+    pub field: Node,
+    /// The greatest distance within: half of the thickness. Infinite where none is known.
+    pub greatest: f64,
+}
+
 /// How a part's field becomes a distance, with g = |∇ω|.
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Profile {
@@ -35,25 +42,32 @@ impl Lowering<'_> {
         leaf: Node,
         (within, half): (Option<Aabb>, f64),
         span: Span,
-    ) -> Option<Node> {
+    ) -> Option<Known> {
         let half = within.map_or(half, |within| within.size().max_element());
         let middle = within.map_or([0.0; 3], |within| within.centre().to_array());
         let is_one = |number: f64| (number - 1.0).abs() <= ROUNDING;
+        let endless = |field| Some(Known { field, greatest: f64::INFINITY });
         match self.profile(leaf, middle, half) {
-            Profile::Linear(slope) if is_one(slope) => Some(leaf),
+            Profile::Linear(slope) if is_one(slope) => endless(leaf),
             Profile::Linear(slope) => {
                 let slope = self.constant(slope);
-                Some(self.binary(Binary::Div, leaf, slope, span))
+                endless(self.binary(Binary::Div, leaf, slope, span))
             }
             Profile::Quadratic { at_surface, second } => {
+                let bent = second.filter(|second| *second < 0.0);
+                // there the slope is zero
+                let greatest = bent.map_or(f64::INFINITY, |second| at_surface / -second);
                 let at_surface = self.constant(if is_one(at_surface) { 1.0 } else { at_surface });
                 let slope = self.slope_of_leaf(leaf, span);
-                if let Some(second) = second.filter(|second| *second < 0.0 && self.divides(slope)) {
-                    return Some(self.distance_by_root(leaf, at_surface, second, span));
-                }
-                let sum = self.binary(Binary::Add, slope, at_surface, span);
-                let twice = self.binary(Binary::Add, leaf, leaf, span);
-                Some(self.binary(Binary::Div, twice, sum, span))
+                let field = match bent.filter(|_| self.divides(slope)) {
+                    Some(second) => self.distance_by_root(leaf, at_surface, second, span),
+                    None => {
+                        let sum = self.binary(Binary::Add, slope, at_surface, span);
+                        let twice = self.binary(Binary::Add, leaf, leaf, span);
+                        self.binary(Binary::Div, twice, sum, span)
+                    }
+                };
+                Some(Known { field, greatest })
             }
             Profile::Other => None,
         }

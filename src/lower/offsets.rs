@@ -65,7 +65,7 @@ impl Lowering<'_> {
                     Anew::Offset(length) => self.offset_leaf(side, length, within, span),
                     Anew::Distance => {
                         let distance = self.exact_distance(side.node, (within, 1.0), span);
-                        self.signed(distance.unwrap_or(side.node), side.negated, span)
+                        self.signed(distance.map_or(side.node, |known| known.field), side.negated, span)
                     }
                 },
             };
@@ -78,7 +78,7 @@ impl Lowering<'_> {
     fn offset_leaf(&mut self, side: Side, length: Node, within: Option<Aabb>, span: Span) -> Node {
         let half = self.known_value(length).map_or(1.0, |length| (4.0 * length.abs()).max(1.0));
         let (field, by) = match self.exact_distance(side.node, (within, half), span) {
-            Some(distance) => (distance, length),
+            Some(distance) => (distance.field, length),
             None => {
                 let slope = self.slope_of_leaf(side.node, span);
                 (side.node, self.binary(Binary::Mul, length, slope, span))

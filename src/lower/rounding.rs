@@ -11,6 +11,7 @@
 
 use rustc_hash::FxHashMap;
 
+use super::distances::Known;
 use super::joints::{Joint, Side};
 use super::lowering::Lowering;
 use super::value::Value;
@@ -38,6 +39,8 @@ struct Rounded {
     field: Node,
     /// Positive wherever the field is, and bounded where the parts are.
     around: Node,
+    /// Half of the thickness of a single formula. Infinite where none is known.
+    half: f64,
 }
 
 impl Lowering<'_> {
@@ -53,6 +56,7 @@ impl Lowering<'_> {
             self.report(warning.help("round a shape first, then bend, twist or taper it"));
         }
         let within = ir::reach(&self.module.graph, shape);
+        let mut thinnest = f64::INFINITY;
         let mut done: FxHashMap<Side, Rounded> = FxHashMap::default();
         for side in order {
             if self.over_budget(span) {
@@ -61,21 +65,31 @@ impl Lowering<'_> {
             let of = |parts: [Side; 2]| parts.map(|part| done[&part]);
             let new = match joints[&side] {
                 Joint::Same(other) => done[&other],
-                Joint::And(parts) => self.rounded_and(of(parts), &radii, span),
+                Joint::And(parts) => {
+                    let parts = of(parts);
+                    thinnest = parts.iter().fold(thinnest, |least, part| least.min(part.half));
+                    self.rounded_and(parts, &radii, span)
+                }
                 Joint::Or(parts) => self.rounded_or(of(parts), &radii, span),
                 Joint::Least(parts) => self.plain(Binary::Min, of(parts), span),
                 Joint::Greatest(parts) => self.plain(Binary::Max, of(parts), span),
                 Joint::Leaf => {
-                    let distance = self.distance(side.node, within, &radii, span);
-                    let field = if side.negated { self.unary(Unary::Neg, distance, span) } else { distance };
-                    Rounded { field, around: field }
+                    let Known { field, greatest } = self.distance(side.node, within, &radii, span);
+                    if side.negated {
+                        let field = self.unary(Unary::Neg, field, span);
+                        Rounded { field, around: field, half: f64::INFINITY }
+                    } else {
+                        Rounded { field, around: field, half: greatest }
+                    }
                 }
             };
             done.insert(side, new);
         }
-        let Rounded { field, around } = done[&root];
+        let Rounded { field, around, .. } = done[&root];
         let fillets = joints.values().any(|joint| matches!(joint, Joint::Or(_))) && radii.inner.is_some();
-        self.warn_of_nothing_left(field, within, radii.length, span);
+        if !self.warn_of_nothing_left(field, within, radii.length, span) {
+            self.warn_of_thin_part(thinnest, radii.length, span);
+        }
         Some(if fillets { self.around(field, around, span) } else { field })
     }
 
@@ -114,6 +128,7 @@ impl Lowering<'_> {
         Rounded {
             field: self.binary(op, a.field, b.field, span),
             around: self.binary(op, a.around, b.around, span),
+            half: f64::INFINITY,
         }
     }
 
@@ -126,7 +141,8 @@ impl Lowering<'_> {
         let arc = self.binary(Binary::Sub, level, short, span);
         // never above the least but for rounding; said twice, bounds are found from either part
         let field = self.binary(Binary::Min, least, arc, span);
-        Rounded { field, around: self.binary(Binary::Min, parts[0].around, parts[1].around, span) }
+        let around = self.binary(Binary::Min, parts[0].around, parts[1].around, span);
+        Rounded { field, around, half: f64::INFINITY }
     }
 
     fn rounded_or(&mut self, parts: [Rounded; 2], radii: &Radii, span: Span) -> Rounded {
@@ -144,6 +160,7 @@ impl Lowering<'_> {
         Rounded {
             field: self.binary(Binary::Max, most, arc, span),
             around: self.binary(Binary::Add, around, wider, span),
+            half: f64::INFINITY,
         }
     }
 
@@ -160,7 +177,7 @@ impl Lowering<'_> {
 
     /// The distance from the surface of a part: exact where that follows from its slope, and otherwise
     /// ω/√(g² + (ω/8r)²), which is right to first order. It has the sign of the part's field everywhere.
-    fn distance(&mut self, leaf: Node, within: Option<Aabb>, radii: &Radii, span: Span) -> Node {
+    fn distance(&mut self, leaf: Node, within: Option<Aabb>, radii: &Radii, span: Span) -> Known {
         if let Some(distance) = self.exact_distance(leaf, (within, 4.0 * radii.length), span) {
             return distance;
         }
@@ -171,6 +188,6 @@ impl Lowering<'_> {
         let [slope, part] = [slope, part].map(|a| self.binary(Binary::Mul, a, a, span));
         let sum = self.binary(Binary::Add, slope, part, span);
         let root = self.unary(Unary::Sqrt, sum, span);
-        self.binary(Binary::DivOrZero, leaf, root, span)
+        Known { field: self.binary(Binary::DivOrZero, leaf, root, span), greatest: f64::INFINITY }
     }
 }

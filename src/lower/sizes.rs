@@ -15,11 +15,11 @@ impl Lowering<'_> {
     /// and `by` the length by which its faces move inwards at most.
     ///
     /// A shape that is more than twice as wide as that everywhere keeps its middle, so it is not looked at: the
-    /// proof takes time.
-    pub fn warn_of_nothing_left(&mut self, left: Node, within: Option<Aabb>, by: f64, span: Span) {
+    /// proof takes time. Returns whether it warned.
+    pub fn warn_of_nothing_left(&mut self, left: Node, within: Option<Aabb>, by: f64, span: Span) -> bool {
         let is_narrow = within.is_some_and(|within| within.size().min_element() <= 2.0 * by);
         if !is_narrow || self.has_open_params || !ir::is_nowhere_positive(&self.module.graph, left) {
-            return;
+            return false;
         }
         let at = self.user_span(span);
         let call = self.scope.calls.last();
@@ -36,6 +36,27 @@ impl Lowering<'_> {
             )
         };
         self.report(Diagnostic::warning(Code::NOTHING_LEFT, at, message).help(help));
+        true
+    }
+
+    /// Warns of a radius of edges that is larger than half of the thickness of a part which they end.
+    pub fn warn_of_thin_part(&mut self, half: f64, radius: f64, span: Span) {
+        // of the square root of a sum
+        const ROUNDING: f64 = 1e-9;
+        if self.has_open_params || radius <= half * (1.0 + ROUNDING) {
+            return;
+        }
+        // what the arc leaves out in the middle of the thickness
+        let lost = radius - (radius * radius - (radius - half).powi(2)).sqrt();
+        let message = format!(
+            "a part is {} thick, less than two radii of {radius}: it ends at least {} before its face",
+            short(2.0 * half),
+            short(lost)
+        );
+        self.report(
+            Diagnostic::warning(Code::THIN_FOR_EDGES, self.user_span(span), message)
+                .help(format!("a radius of {} or less leaves all faces where they are", short(half))),
+        );
     }
 
     /// Warns of a torus whose section is wider than its ring: it cuts itself, and has no hole.
@@ -58,4 +79,9 @@ impl Lowering<'_> {
             );
         }
     }
+}
+
+/// A number with three digits.
+fn short(number: f64) -> f64 {
+    format!("{number:.2e}").parse().unwrap_or(number)
 }
