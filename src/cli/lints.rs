@@ -46,8 +46,8 @@ impl Searches {
         if let Some((_, parts)) = self.known.iter().find(|(other, _)| *other == search) {
             return *parts;
         }
-        let (_, [wall, gap], domain) = search;
-        let parts = solid.thin_parts([wall, gap], &domain, &mut self.thin);
+        let (_, lengths, domain) = search;
+        let parts = solid.thin_parts(lengths, &domain, &mut self.thin);
         self.known.push((search, parts));
         parts
     }
@@ -208,8 +208,8 @@ impl<'a> Subject<'a> {
     }
 }
 
-/// A shape, the widths, m, below which walls and gaps are reported, and the box of the scene.
-type Search = (Node, [f64; 2], Aabb);
+/// A shape, what is looked for in it, m, and the box of the scene.
+type Search = (Node, [f64; 3], Aabb);
 
 /// Warnings about obstacles that the particles of their scenes are too large for, and about fluids that lie
 /// in obstacles. The walls of a container are not looked at.
@@ -249,7 +249,7 @@ pub(super) fn of_scenes(
         for (k, (obstacle, body)) in scene.obstacles.iter().zip(obstacles).enumerate() {
             found.extend(experiment::out_of_reach((scene, spacing), obstacle, (&body.solid, outside)));
             let wall = experiment::wall_limit(scene, usize::from(outside.is_some()) + k);
-            let search = (obstacle.shape, [wall * spacing, spacing], scene.domain);
+            let search = (obstacle.shape, experiment::thin_lengths(wall, spacing), scene.domain);
             found.extend(experiment::too_thin(
                 (scene, spacing),
                 obstacle,
@@ -373,8 +373,8 @@ pub(super) fn of_experiment(experiment: &Experiment, searches: &mut Searches) ->
             let solids = (&body.solid, outside.map(|outside| &outside.solid));
             found.list.extend(experiment::out_of_reach((scene, spacing), obstacle, solids));
             let wall = experiment::wall_limit(scene, number);
-            let parts =
-                searches.thin_parts(&body.solid, (obstacle.shape, [wall * spacing, spacing], scene.domain));
+            let lengths = experiment::thin_lengths(wall, spacing);
+            let parts = searches.thin_parts(&body.solid, (obstacle.shape, lengths, scene.domain));
             found.list.extend(experiment::too_thin((scene, spacing), obstacle, wall, parts));
         }
     }

@@ -199,7 +199,7 @@ fn operations_that_a_choice_leaves_out_are_not_blamed() {
 
 fn thinner_than(solid: &Solid, wall: f64, gap: f64) -> [Option<ThinPart>; 2] {
     let within = Aabb::new(DVec3::splat(-100.0), DVec3::splat(100.0));
-    solid.thin_parts([wall, gap], &within, &mut { usize::MAX })
+    solid.thin_parts([wall, gap, gap], &within, &mut { usize::MAX })
 }
 
 /// No fluid is below a plate on the floor of its box, or behind one at its wall.
@@ -207,7 +207,7 @@ fn thinner_than(solid: &Solid, wall: f64, gap: f64) -> [Option<ThinPart>; 2] {
 fn walls_without_fluid_on_both_sides_and_gaps_outside_do_not_count() {
     let within = Aabb::new(DVec3::ZERO, DVec3::splat(2.0));
     let parts = |text: &str| {
-        solid(text).thin_parts([0.02, 0.04], &within, &mut { usize::MAX }).map(|part| part.is_some())
+        solid(text).thin_parts([0.02, 0.04, 0.04], &within, &mut { usize::MAX }).map(|part| part.is_some())
     };
     for (text, wanted) in [
         ("box([0, 0, 0], [2, 2, 0.01])", [false, false]),
@@ -229,9 +229,9 @@ fn walls_without_fluid_on_both_sides_and_gaps_outside_do_not_count() {
     // beyond its budget the search says nothing
     let plate = solid("box([0.5, 0.5, 0.5], [1.5, 1.5, 0.51])");
     let mut budget = 1_000_000_000;
-    assert!(plate.thin_parts([0.02, 0.04], &within, &mut budget)[0].is_some());
+    assert!(plate.thin_parts([0.02, 0.04, 0.04], &within, &mut budget)[0].is_some());
     assert!(budget < 1_000_000_000);
-    assert_eq!(plate.thin_parts([0.02, 0.04], &within, &mut 1000), [None; 2]);
+    assert_eq!(plate.thin_parts([0.02, 0.04, 0.04], &within, &mut 1000), [None; 2]);
 }
 
 /// Plates and slots of known thickness, in any direction.
@@ -287,6 +287,23 @@ fn flows_that_are_validated_check_without_a_word() {
             let outcome = rfm(root(), &["check", "--deny", "warnings", path.to_str().unwrap()]).expect(0);
             assert_eq!(outcome.stderr, "", "{}", path.display());
         }
+    }
+}
+
+/// Slots hold less than they should below two spacings.
+#[test]
+fn gaps_of_less_than_two_spacings_are_told() {
+    for (width, told) in [(1.2, true), (1.9, true), (2.1, false), (4.0, false)] {
+        let text = format!(
+            "rfm 1\nsolid mould = box([-1, -1, -0.3], [2, 1, 0]) \\ box([0.1, -2, -0.2], [0.1 + {width}*2 cm, 2, 0.1])\n\
+             scene m {{\n  box {{ min: [0, 0, -0.25], max: [0.4, 0.2, 0.4] }}\n  obstacle {{ solid: mould }}\n\
+             fluid w {{ shape: box([0, 0, 0], [0.4, 0.2, 0.2]), spacing: 2 cm }}\n}}\n"
+        );
+        let program = Program::from_source("t.rfm", text).unwrap_or_else(|e| panic!("{e}"));
+        let found = Experiment::new(&program, "m", Engine::Auto).unwrap().misfits();
+        let gaps: Vec<_> = found.list.iter().filter(|message| message.code.0 == "W0508").collect();
+        assert_eq!(gaps.len(), usize::from(told), "{width}: {gaps:?}");
+        assert!(gaps.iter().all(|gap| gap.message.contains(&format!("{width:.1} times"))), "{gaps:?}");
     }
 }
 

@@ -15,8 +15,10 @@ use crate::solid::construction::Solid;
 struct Search {
     /// Walls that are thinner than this length, m.
     wall: f64,
-    /// Gaps thinner than this length, m, are reported: a fluid needs this much room.
+    /// Gaps that are thinner than this length, m.
     gap: f64,
+    /// The room that a fluid needs beyond a wall, m.
+    room: f64,
     /// Where a fluid may be.
     within: Aabb,
 }
@@ -26,7 +28,7 @@ impl Search {
     /// from the first to the second one; the sign is 1 for a wall.
     fn is_in_fluid(&self, [first, second]: [DVec3; 2], (direction, sign): (DVec3, f64)) -> bool {
         let within = self.within.grown(-BORDER * self.within.size().max_element());
-        let beyond = if sign > 0.0 { self.gap * direction } else { DVec3::ZERO };
+        let beyond = if sign > 0.0 { self.room * direction } else { DVec3::ZERO };
         within.contains(first - beyond) && within.contains(second + beyond)
     }
 }
@@ -64,24 +66,25 @@ const START: f64 = 1e-6;
 /// same holds for a wedge whose angle is less than 12°.
 const OPPOSITE: f64 = -0.98;
 
-/// A part whose sides are smaller than the square of this many of the wanted thicknesses is a detail.
+/// A wall whose sides are smaller than the square of this many of the wanted thicknesses is a detail, and so is a gap
+/// with sides smaller than that of this many times the room of a fluid.
 const LEAST_EXTENT: f64 = 2.0;
 
 impl Solid {
     /// The thinnest wall and the thinnest gap of the solid that are thinner than a length each, and extend
-    /// over twice this length at least; `None` where there is none. Very large solids are not looked at, nor
+    /// over twice the length of the wall, and twice the third length; `None` where there is none. Very large solids are not looked at, nor
     /// are those without bounds in a box without them.
     ///
     /// A fluid may be in a finite box. Both faces of a gap must lie in it, and beyond both faces of a wall
-    /// there must be as much room in it as a gap needs. The search takes its operations from a budget; if too
+    /// there must be as much room in it as the third length. The search takes its operations from a budget; if too
     /// few are left, it finds nothing.
     pub fn thin_parts(
         &self,
-        [wall, gap]: [f64; 2],
+        [wall, gap, room]: [f64; 3],
         within: &Aabb,
         budget: &mut usize,
     ) -> [Option<ThinPart>; 2] {
-        let search = Search { wall, gap, within: *within };
+        let search = Search { wall, gap, room, within: *within };
         let operations = self.formula().0.len();
         let (..=MOST_OPERATIONS, Some(left)) = (operations, budget.checked_sub(SIGNS * operations)) else {
             return [None; 2];
@@ -126,7 +129,7 @@ impl Solid {
                 }
             }
         }
-        let mut lengths = [search.wall, search.gap].into_iter();
+        let mut lengths = [search.wall, search.room].into_iter();
         found.map(|part| {
             let least = (LEAST_EXTENT * lengths.next()?).powi(2);
             // both sides were counted
