@@ -390,6 +390,11 @@ FLUID_OF_TIME = "W0522":
 "The fluid's `shape` says where the fluid is at the start. Its particles are placed once, at t = 0, so a formula with the time `t`
 has no effect on them later. Obstacles and the container may move; a fluid gets its motion from its `velocity`, from gravity and
 from them.";
+CLAMPED = "W0523":
+"In a fluid that fills all its room, wcsph takes gradients by differences and keeps negative pressures, because only differences of
+pressure matter there. `shifting: 0` and `gradients: pairs` rule out the differences, and with pairs negative pressures are cut off at zero
+unless the scene says `negative_pressure: keep`. Waves of sound and flows around bodies come out wrong then. Stating `negative_pressure`
+either way silences the warning.";
 OBSTACLE_FILLS_BOX = "E0502":
 "The obstacle covers every place where fluid was to be put: nothing is left to simulate.";
 }

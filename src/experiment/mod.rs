@@ -111,6 +111,7 @@ impl Experiment {
         let wholes = || parts.iter().map(|part| &part.whole);
         let has_surface = || room::has_surface(&scene, &fluid, wholes(), parameters.spacing());
         method.settle(&has_surface);
+        let clamped = parameters::clamped(&scene, &method, &has_surface);
         let scene = Scene { method, ..scene };
         parameters.method = method;
         parameters.support_radius = parameters::support_radius(&scene, mass);
@@ -127,7 +128,7 @@ impl Experiment {
                 return Err(refuse(&program, *refusal));
             }
         }
-        let warnings = too_long.into_iter().chain(parameters::stirring(&scene, &parameters));
+        let warnings = clamped.into_iter().chain(too_long).chain(parameters::stirring(&scene, &parameters));
         let warnings = warnings.chain(parameters::slow_sound(&scene, &parameters));
         let warnings = warnings.chain(parameters::many_steps(&scene, &parameters));
         let warnings = warnings.chain(drag::warnings(&scene, &parameters, &bodies));

@@ -2,6 +2,7 @@
 
 use rfm::glam::DVec3;
 use rfm::sph::{Gradients, Method, Probe, Simulation};
+use rfm::{Engine, Experiment, Program};
 
 use crate::tool::{experiment, run_to, simulation};
 
@@ -209,6 +210,28 @@ fn differences_are_chosen_for_fluids_without_a_surface() {
     assert_eq!(gradients_of(1.0, "gradients: pairs"), Gradients::Pairs);
     assert_eq!(gradients_of(1.0, "shifting: 0"), Gradients::Pairs);
     assert_eq!(gradients_of(0.9, "gradients: differences"), Gradients::Differences);
+}
+
+/// What rules out differences in a full room also cuts off negative pressures, and that is told unless the scene says so.
+#[test]
+fn pressures_that_are_cut_off_in_a_full_room_are_told() {
+    for (level, keys, told) in [
+        (1, "", false),
+        (1, "shifting: 0", true),
+        (1, "gradients: pairs", true),
+        (1, "shifting: 0, gradients: differences", false),
+        (1, "gradients: pairs, negative_pressure: clamp", false),
+        (1, "shifting: 0, negative_pressure: keep", false),
+        (0, "shifting: 0", false),
+    ] {
+        let text = format!(
+            "rfm 1\nscene s {{\n  box {{ max: [1, 1, 1] }}\n  fluid oil {{ shape: z <= 0.8 + 0.2*{level}, spacing: 0.1\n{keys} }}\n\
+             run {{ until: 1 s }}\n}}"
+        );
+        let program = Program::from_source("t.rfm", text).unwrap_or_else(|e| panic!("{keys}: {e}"));
+        let found = Experiment::new(&program, "s", Engine::Auto).unwrap().warnings();
+        assert_eq!(found.list.iter().any(|found| found.code.0 == "W0523"), told, "{level} {keys}: {found:?}");
+    }
 }
 
 /// A blade that turns in a full box leaves no room free. A piston does that is drawn back, also if it comes back every

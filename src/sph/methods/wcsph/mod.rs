@@ -146,6 +146,17 @@ impl Wcsph {
         })
     }
 
+    /// The key that rules out differences of pressure where they would be the default, so that negative pressures are cut
+    /// off although nothing says so.
+    pub(crate) fn clamped_by(&self) -> Option<&'static str> {
+        let key = match (self.gradients, self.shifting) {
+            (Some(Gradients::Pairs), _) => Some("gradients: pairs"),
+            (None, Some(0.0)) => Some("shifting: 0"),
+            (None | Some(Gradients::Differences), _) => None,
+        };
+        key.filter(|_| self.negative_pressure.is_none())
+    }
+
     /// The strength of the shifting, stated or derived.
     pub fn shifting(&self) -> f64 {
         self.shifting.unwrap_or(match self.gradients() {
@@ -220,13 +231,13 @@ impl Declaration for Wcsph {
                     Gradients::Pairs => "pairs",
                     Gradients::Differences => "differences",
                 },
-                derived: "differences in a fluid that fills all its room, else pairs",
+                derived: "differences in a fluid that fills all its room, unless `shifting` is 0, else pairs",
             },
         },
         Key {
             name: "shifting",
             block: KeyBlock::Fluid,
-            about: "how strongly particles drift to where there are fewer of them",
+            about: "how strongly particles drift to where there are fewer of them; gradients by differences need it, so 0 makes them pairs unless they are stated",
             value: Value::Number {
                 dimension: Dimension::NONE,
                 bound: Bound::NotNegative,
