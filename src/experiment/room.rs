@@ -57,6 +57,9 @@ pub(super) struct Crowd<'a> {
 /// So few solids are asked themselves: to find the bounds of one may take longer than all that is asked of it.
 const FEW: usize = 4;
 
+/// Number of particles that a run of minutes has.
+const USUAL_SITES: f64 = 1e5;
+
 impl<'a> Crowd<'a> {
     pub fn of(solids: impl Iterator<Item = &'a Solid>) -> Self {
         let solids: Vec<&Solid> = solids.collect();
@@ -213,9 +216,15 @@ impl Experiment {
                     "with {} between particles the shape would hold {sites:.1e} of them; at most {MAX_SITES:.0e} are possible",
                     length(spacing)
                 );
-                let fits = spacing * (sites / (0.5 * MAX_SITES)).cbrt();
+                let usual = spacing * (sites / USUAL_SITES).cbrt();
+                let least = spacing * (sites / (0.5 * MAX_SITES)).cbrt();
                 let span = fluid.size_span.unwrap_or(fluid.shape_span);
-                no_room(span, message).help(format!("write for example `spacing: {}`", length(fits)))
+                no_room(span, message).help(format!(
+                    "write for example `spacing: {}` for {USUAL_SITES:.0e} particles; {} makes {:.0e}, with which a run takes days",
+                    length(usual),
+                    length(least),
+                    0.5 * MAX_SITES
+                ))
             }
             SeedError::NothingLeft(carved)
                 if carved.inside + carved.too_close + carved.outside_box == 0

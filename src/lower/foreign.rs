@@ -232,9 +232,18 @@ fn joined(name: &str, a: &[&str]) -> Option<Words> {
         "bevel" | "chamfer" => written("`chamfer` here", "chamfer(a, b, 0.1)"),
         "dilate" | "erode" | "inflate" => written("`.offset` here", "sphere(1).offset(0.1)"),
         "onion" | "thicken" | "hollow" => written("`.shell` here", "sphere(1).shell(0.1)"),
-        "hull" | "minkowski" | "elongate" => words(
+        "hull" | "convex_hull" => words(
+            "there are no hulls here",
+            "the hull of two equal balls is `capsule(0.1, 1)`, that of many along a path `sweep([[0, 0, 0], [1, 0, 0], [1, 1, 0]], 0.1)`, \
+             that of two outlines at two heights `polygon([[0, 0], [1, 0], [0, 1]]).loft(polygon([[0, 0], [1, 0], [1, 1]]), 0, 1)`",
+        ),
+        "minkowski" => words(
+            "there are no sums of shapes here",
+            "with a ball the sum has round edges: write `box().offset(0.1).round(0.1)`",
+        ),
+        "elongate" => words(
             "there is no such operation here",
-            "write the shape by inequalities; a hollow ball is `sphere(1) \\ sphere(0.9)`, a rod with round ends `capsule(0.1, 1)`",
+            "a rod with round ends is `capsule(0.1, 1)`, an outline of some length `polygon([[0, 0], [1, 0], [0, 1]]).extrude(0, 1)`",
         ),
         "repeat" | "array" | "pattern" | "duplicate" | "grid" => {
             written("`.repeat` here", "sphere(0.3).repeat([1, 0, 0], [6, 1, 1])")

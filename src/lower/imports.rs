@@ -193,6 +193,12 @@ impl<'a> Lowering<'a> {
 
     fn triangles(&self, path: &str, unit: f64, span: Span) -> Result<Arc<dyn Table>, Diagnostic> {
         let name = self.name_of_file(path);
+        if !triangles::is_known(path) {
+            let read = triangles::FORMATS.join(", .");
+            let message = format!("meshes are read from files whose names end in .{read}, not from `{path}`");
+            return Err(Diagnostic::error(Code::MESH, span, message)
+                .help("save the mesh as STL, OBJ or PLY in the program that it comes from"));
+        }
         let bytes = self.read_file(path, span)?;
         let refused = |message: String| {
             Diagnostic::error(Code::MESH, span, message)

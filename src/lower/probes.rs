@@ -31,7 +31,7 @@ declare_keys! {
         FLUX = "flux", Block(super::flux_keys::ALL), Required,
             "the block for a plane: measures how much flows through it, in kg/s";
         ENERGY = "energy", Other, Required,
-            "measures the energies of the fluid with this name, in J";
+            "measures the energies of the fluid with this name, in J; gravity that depends on the place has no potential energy here";
         AUDIT = "audit", Other, Required,
             "tells how far energy, volume and compression of the fluid with this name are off";
         ABOUT = "about", Vector(Dimension::LENGTH), Is3([0.0, 0.0, 0.0]),

@@ -97,6 +97,22 @@ pub fn method_call(name: &str, arguments: &str) -> Option<String> {
     })
 }
 
+/// The method that makes a solid of a profile, for the OpenSCAD operator of this name with these arguments.
+pub fn of_a_profile(name: &str, arguments: &str) -> Option<String> {
+    match name {
+        "rotate_extrude" => Some(".revolve()".into()),
+        "linear_extrude" => {
+            let first = arguments.split(',').next().unwrap_or_default();
+            let height =
+                first.trim().strip_prefix("height").map_or(first, |rest| rest.trim().trim_start_matches('='));
+            let height = height.trim();
+            let height = if height.is_empty() || height.contains('=') { "1" } else { height };
+            Some(format!(".extrude(0, {height})"))
+        }
+        _ => None,
+    }
+}
+
 /// The turns that `rotate(…)` means elsewhere: three angles about the axes, or one about z.
 pub fn turned(arguments: &str) -> String {
     let arguments = arguments.trim();

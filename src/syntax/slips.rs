@@ -108,9 +108,7 @@ impl<'t> Slip<'t> {
             return Some(self.syntax("there is no operator `NOT`").help("write `not a`"));
         }
         if last_word(line) == "for" {
-            return Some(
-                self.unexpected().at("`for` is written `any` here").help("write `any i in 0..6: …`"),
-            );
+            return Some(self.fold_with_for());
         }
         if called && line.ends_with(')') {
             return self.transform_in_front();
@@ -213,8 +211,16 @@ impl<'t> Slip<'t> {
             let written = if fits(&[&shape]) { shape } else { format!("{}(…)", self.found) };
             return Some(self.unexpected().help(format!("a method follows a point: write `.{written}`")));
         }
-        let method = foreign::method(name).filter(|_| !follows_a_method)?;
         let arguments = &before[open + 1..before.len() - 1];
+        if let Some(call) = foreign::of_a_profile(name, arguments).filter(|_| !follows_a_method) {
+            let shape = if fits(&[&shape]) { shape } else { "profile".into() };
+            return Some(
+                self.unexpected()
+                    .at("a method stands behind its shape")
+                    .help(format!("write `{shape}{call}`")),
+            );
+        }
+        let method = foreign::method(name).filter(|_| !follows_a_method)?;
         let written = match (fits(&[&shape, arguments]), foreign::method_call(name, arguments)) {
             (true, Some(call)) => format!("{shape}{call}"),
             _ => format!("shape.{method}(…)"),
@@ -368,7 +374,7 @@ impl<'t> Slip<'t> {
         if let Some(known) = self.vector_in_brackets().or_else(|| self.range_without_in()) {
             return Some(known);
         }
-        if let Some(known) = self.mark_in_a_head() {
+        if let Some(known) = self.mark_in_a_head().or_else(|| self.range_with_a_colon()) {
             return Some(known);
         }
         let help = match self.found {

@@ -36,7 +36,7 @@ use nearest::Feature;
 use surface::Surface;
 use tree::Tree;
 
-pub use read::{FORMATS, read};
+pub use read::{FORMATS, is_known, read};
 pub use surface::NotClosed;
 
 /// Points nearer to the surface than this, relative to the size of the solid, have the gradient of the surface: the way

@@ -72,6 +72,13 @@ const WORDS: &[&str] = &[
     "function f(x) = x",
     "let n = 6\nfor i in 0..n: sphere(1)",
     "solid s = for i in 0..6: sphere(i)",
+    "solid s = for k in 2..9: sphere(0.1).move([k, 0, 0])",
+    "solid s = any i in 0:5: sphere(0.1).move([i, 0, 0])",
+    "solid s = linear_extrude(2) polygon([[0, 0], [1, 0], [0, 1]])",
+    "solid s = linear_extrude(height = 2) polygon([[0, 0], [1, 0], [0, 1]])",
+    "solid s = rotate_extrude() polygon([[1, 0], [2, 0], [1, 1]])",
+    "solid s = minkowski(box(), sphere(0.1))",
+    "solid s = mesh(\"part.off\")",
     "solid s = any i in range(6): sphere(1)",
     "sphere(1)",
     "cube(1);",
@@ -389,6 +396,10 @@ fn is_accepted(code: &str) -> bool {
             }
             "height" | "pressure" | "flux" => {
                 text.replace("  fluid", &format!("  probe p {{ {entries} }}\n  fluid"))
+            }
+            "normal" => {
+                let probe = format!("  probe p {{ flux {{ point: [0.5, 0, 0], {entries} }} }}\n  fluid");
+                text.replace("  fluid", &probe)
             }
             "picture" => text.replace("  fluid", &format!("  {entries}\n  fluid")),
             "camera" | "look_at" | "zoom" | "cut" | "hide" | "glass" => {

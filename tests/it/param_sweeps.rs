@@ -72,7 +72,7 @@ fn several_sweeps_make_a_grid_with_units() {
     let text = "rfm 1\nparam a = 10 mm\nparam alpha = 0 deg in 0 deg .. 90 deg\n\
                 solid s = box([0, 0, 0], [a, 1, 1]).rotate_z(alpha)\n";
     let folder = in_folder(text);
-    let arguments = ["mesh", "a.rfm", "--cells", "24", "-o", "part.stl", "--into", "out", "--json"];
+    let arguments = ["mesh", "a.rfm", "--cells", "24", "-o", "parts/a.stl", "--into", "out", "--json"];
     let sweeps = ["--sweep", "a=1..3 m:2", "--sweep", "alpha=0..45 deg:4"];
     let printed = rfm(folder.path(), &[&arguments[..], &sweeps[..]].concat()).expect(0).json();
     let found = index(&folder.path().join("out"));
@@ -83,7 +83,7 @@ fn several_sweeps_make_a_grid_with_units() {
         let a = row["values"][0].as_f64().unwrap();
         assert!((figure(row, "volume") / a - 1.0).abs() < 1e-3, "{row}");
         assert_eq!(figure(row, "closed"), 1.0);
-        let part = folder.path().join("out").join(row["folder"].as_str().unwrap()).join("part.stl");
+        let part = folder.path().join("out").join(row["folder"].as_str().unwrap()).join("parts/a.stl");
         assert!(part.is_file());
     }
     // a line for each of the four angles

@@ -30,11 +30,11 @@ pub(in crate::cli) fn by_measuring(
 /// A warning about a solid that has a box but shows nothing in it, as `sphere(1) and not sphere(1)`.
 fn may_be_empty(named: &NamedSolid) -> Diagnostic {
     let message = format!(
-        "solid `{}` may be empty: {VOLUME_CELLS} cells along its longest side show nothing of it, and no part is hidden between them",
+        "solid `{}` may be empty, or too thin to be seen: {VOLUME_CELLS} cells along its longest side show nothing of it",
         named.name
     );
     Diagnostic::warning(Code::EMPTY_SOLID, named.span, message)
-        .help("look for a shape that is joined by `and` to its own outside, or for a thickness of zero")
+        .help("look for a shape that is joined by `and` to its own outside, for a thickness of zero, or for a missing unit")
 }
 
 /// Warnings about a solid that is empty, unbounded or thin.

@@ -138,7 +138,7 @@ fn alone(value: f64) -> String {
 }
 
 /// A value with the digits that its error leaves it, and the error with two, in one notation.
-fn rounded(value: f64, error: f64) -> (String, String) {
+pub(super) fn rounded(value: f64, error: f64) -> (String, String) {
     let last = if error > 0.0 { error.log10().floor() - 1.0 } else { -6.0 };
     let size = value.abs().max(error);
     if size == 0.0 || PLAIN.contains(&size) {

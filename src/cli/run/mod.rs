@@ -66,6 +66,7 @@ pub(super) fn run(shared: &Shared, options: &Run) -> Result<(), Failure> {
         Some(checkpoint) => (experiment.resume(checkpoint).map_err(Failure::usage)?, 0),
         None => {
             input::show(&lints::of_experiment(&experiment, &mut lints::Searches::short()));
+            probes::tell_of_potentials(experiment.scene());
             start(&experiment)?
         }
     };

@@ -4,7 +4,7 @@ use std::fmt::Write as _;
 
 use super::super::output::significant;
 use super::super::plot::{self, Axis, EvenAxis, HEIGHT, LEFT, Legend, RIGHT, SECOND_AXIS, TOP, WIDTH};
-use super::means::Means;
+use super::means::{Means, rounded};
 use rfm::sph::Probe;
 
 const COLOURS: [&str; 6] = ["#1b6ca8", "#c05621", "#2f855a", "#6b46c1", "#b7791f", "#4a5568"];
@@ -91,8 +91,11 @@ pub(super) fn drawn(name: &str, probe: &Probe, table: &str, means: Option<&Means
             plot::dot(&mut out, x.at(t), axes[axis].at(v), s.colour);
         }
         if let Some((from, mean, error)) = mean {
-            let within = error.map_or_else(String::new, |error| format!(" ± {}", significant(error, 1)));
-            legend.remark(&mut out, &format!("mean {}{within}", significant(mean, 3)));
+            let figures = match error.map(|error| rounded(mean, error)) {
+                Some((mean, error)) => format!("mean {mean} ± {error}"),
+                None => format!("mean {}", significant(mean, 3)),
+            };
+            legend.remark(&mut out, &figures);
             legend.remark(&mut out, &format!("from {from} s on"));
         }
     }

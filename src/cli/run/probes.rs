@@ -19,7 +19,7 @@ use crate::cli::output::Shown;
 use crate::cli::saved::{HISTORY, OWN_TABLES};
 use rfm::diagnostic::Code;
 use rfm::experiment::{Every, probe_column};
-use rfm::lower::{AskedMean, Scene};
+use rfm::lower::{AskedMean, Gravity, Scene};
 use rfm::sph::{Checkpoint, Gauge, Probe, Simulation, short_time};
 
 /// A resumed run takes over samples up to this relative tolerance after the checkpoint's time. Times are
@@ -28,6 +28,17 @@ const ROUNDING: f64 = 1e-10;
 
 /// Samples of a run's own tables from one frame to the next.
 const SAMPLES_PER_FRAME: f64 = 10.0;
+
+/// Says of the probes of energy what they leave out.
+pub(super) fn tell_of_potentials(scene: &Scene) {
+    let mut energies = scene.probes.iter().filter(|probe| probe.measured == Probe::Energy);
+    if let (Gravity::Field(_), Some(probe)) = (scene.gravity, energies.next()) {
+        note(format!(
+            "gravity depends on the place, and the potential energy of such a force is not known: in the probe `{}` it is 0, and not part of `total`",
+            probe.name
+        ));
+    }
+}
 
 /// The probes of a run.
 pub(super) struct Probes {

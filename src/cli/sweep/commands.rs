@@ -1,6 +1,6 @@
 //! What each command does in the folder of a combination.
 
-use std::path::{Path, PathBuf};
+use std::path::{Component, Path, PathBuf};
 
 use super::super::args::{Check, Mesh, MessageFormat, Run};
 use super::super::report::Report;
@@ -24,9 +24,18 @@ fn task<'a>(
     Task { shared, command, file, sweeps: &sweep.sweep, folder, options, resume, force }
 }
 
-/// A path within a folder that has the name of one that was asked for.
+/// The path within a folder that was asked for. Of one that leads elsewhere, only the name is kept.
 fn within(folder: &Path, asked: Option<&PathBuf>) -> Option<PathBuf> {
-    asked.map(|path| folder.join(path.file_name().unwrap_or_default()))
+    let is_below = |part: Component<'_>| matches!(part, Component::Normal(_) | Component::CurDir);
+    asked.map(|path| match path.components().all(is_below) {
+        true => {
+            let path = folder.join(path);
+            // if there can be no such folder, the message about the file says why
+            let _ = path.parent().map(std::fs::create_dir_all);
+            path
+        }
+        false => folder.join(path.file_name().unwrap_or_default()),
+    })
 }
 
 /// Whether a path stands for standard output, on which a sweep prints its table.

@@ -78,6 +78,33 @@ impl Slip<'_> {
         }))
     }
 
+    /// `for i in 0..5: sphere(0.1).move([i, 0, 0])`
+    pub(super) fn fold_with_for(&self) -> Diagnostic {
+        let line = self.after().lines().next().unwrap_or_default();
+        let range = line.trim_start().strip_prefix("in ").and_then(|rest| rest.split_once(':'));
+        let range = range
+            .map(|(range, _)| range.trim())
+            .filter(|range| range.contains("..") || range.starts_with('['));
+        let written = match range.filter(|range| fits(&[range])) {
+            Some(range) => format!("any {} in {range}: …", self.found),
+            None => "any i in 0..6: …".into(),
+        };
+        self.unexpected().at("`for` is written `any` here").help(format!("write `{written}`"))
+    }
+
+    /// `any i in 0:5: sphere(0.1).move([i, 0, 0])`
+    pub(super) fn range_with_a_colon(&self) -> Option<Diagnostic> {
+        let (head, range) = self.on_its_line().rsplit_once(" in ").filter(|_| self.found == ":")?;
+        let variable = last_word(head);
+        let fold = last_word(head.strip_suffix(variable)?.trim_end());
+        let (start, end) = range.split_once(':')?;
+        let [start, end] = [start.trim(), end.trim()];
+        (FOLDS.contains(&fold) && !end.contains(':') && fits(&[start, end])).then(|| {
+            let written = format!("{fold} {variable} in {start}..{end}: …");
+            self.unexpected().at("a range is written with dots").help(format!("write `{written}`"))
+        })
+    }
+
     /// `sum(i, 0..5, i)`
     pub(super) fn fold_of_three(&self) -> Option<Diagnostic> {
         let line = self.on_its_line();

@@ -10,6 +10,11 @@ use glam::DVec3;
 /// The endings of files that are read.
 pub const FORMATS: [&str; 3] = ["stl", "obj", "ply"];
 
+/// Whether the format of a file with this name is read.
+pub fn is_known(name: &str) -> bool {
+    name.rsplit_once('.').is_some_and(|(_, ending)| FORMATS.contains(&ending.to_ascii_lowercase().as_str()))
+}
+
 /// The corners of a file's triangles, in the order of the file; polygons are cut into triangles. The format
 /// is that of the name's ending.
 ///

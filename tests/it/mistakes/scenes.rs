@@ -13,6 +13,7 @@ const SCENE: [(&str, &str); 5] = [
 
 const SCENES: &[&str] = &[
     "obstacle sphere(0.1)",
+    "probe q { flux { point: [0.5, 0, 0], normal: x } }",
     "obstacle cylinder(0.1, 0.2).move([0.5, 0.5, 0]).rotate_z(3 deg)",
     "container box([0, 0, 0], [1, 1, 0.9])",
     "gravity: [0 0 -9.81]",
