@@ -73,6 +73,7 @@ const WORDS: &[&str] = &[
     "let n = 6\nfor i in 0..n: sphere(1)",
     "solid s = for i in 0..6: sphere(i)",
     "solid s = for k in 2..9: sphere(0.1).move([k, 0, 0])",
+    "solid s = for i in range(5): sphere(0.1).move([i, 0, 0])",
     "solid s = any i in 0:5: sphere(0.1).move([i, 0, 0])",
     "solid s = linear_extrude(2) polygon([[0, 0], [1, 0], [0, 1]])",
     "solid s = linear_extrude(height = 2) polygon([[0, 0], [1, 0], [0, 1]])",

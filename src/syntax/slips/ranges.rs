@@ -81,11 +81,9 @@ impl Slip<'_> {
     /// `for i in 0..5: sphere(0.1).move([i, 0, 0])`
     pub(super) fn fold_with_for(&self) -> Diagnostic {
         let line = self.after().lines().next().unwrap_or_default();
-        let range = line.trim_start().strip_prefix("in ").and_then(|rest| rest.split_once(':'));
-        let range = range
-            .map(|(range, _)| range.trim())
-            .filter(|range| range.contains("..") || range.starts_with('['));
-        let written = match range.filter(|range| fits(&[range])) {
+        let head = line.trim_start().strip_prefix("in ").and_then(|rest| rest.split_once(':'));
+        let range = head.and_then(|(range, _)| members(range.trim()));
+        let written = match range.filter(|range| fits(&[range.as_str()])) {
             Some(range) => format!("any {} in {range}: …", self.found),
             None => "any i in 0..6: …".into(),
         };
@@ -99,7 +97,10 @@ impl Slip<'_> {
         let fold = last_word(head.strip_suffix(variable)?.trim_end());
         let (start, end) = range.split_once(':')?;
         let [start, end] = [start.trim(), end.trim()];
-        (FOLDS.contains(&fold) && !end.contains(':') && fits(&[start, end])).then(|| {
+        // with a step between both ends it says something else
+        let rest = self.after().lines().next().unwrap_or_default();
+        let has_step = rest.split_once(':').is_some_and(|(last, _)| last.trim().parse::<f64>().is_ok());
+        (FOLDS.contains(&fold) && !has_step && fits(&[start, end])).then(|| {
             let written = format!("{fold} {variable} in {start}..{end}: …");
             self.unexpected().at("a range is written with dots").help(format!("write `{written}`"))
         })
@@ -310,6 +311,18 @@ fn replaced(formula: &str, name: &str, value: &str) -> String {
         rest = behind;
     }
     written + rest
+}
+
+/// The members of a fold as they are written here: `0..5` and `[1, 2]` stay, and `range(5)` is `0..5`.
+fn members(range: &str) -> Option<String> {
+    if let Some(arguments) = range.strip_prefix("range").and_then(bracketed) {
+        return match parts(arguments)[..] {
+            [end] => Some(format!("0..{end}")),
+            [start, end] => Some(format!("{start}..{end}")),
+            _ => None,
+        };
+    }
+    (range.contains("..") && !range.contains('=') || range.starts_with('[')).then(|| range.to_string())
 }
 
 #[cfg(test)]
