@@ -179,9 +179,10 @@ UNUSED = "W0401":
 "The item, the parameter of a function or the variable of a fold is never used. Remove it, or start its name with `_` to keep
 it silently. A fold whose variable is not used has many equal members.";
 EMPTY_SOLID = "W0402":
-"Interval arithmetic proves that ω is nowhere positive: the solid is empty, its mesh has no triangles and nothing
-ever collides with it. If the message says that the solid *may be* empty, that is not proven: `check` found no part of it on its grid,
-and far thinner parts, as of a plate of 1 m whose thickness lacks its unit µm, are not looked for between the nodes.";
+"Interval arithmetic proves that ω is nowhere positive: the solid is empty, its mesh has no triangles and nothing ever
+collides with it. If the message says that the solid *may be* empty, that is not proven: `check` found no part of it on
+its grid, and far thinner parts, as of a plate of 1 m whose thickness lacks its unit µm, are not looked for between the
+nodes.";
 UNBOUNDED_SOLID = "W0403":
 "The solid could not be proven to end towards the sides that the message names: it cannot be meshed over its own
 bounds. If one member of a union is to blame, the message marks it. Intersect it with a box, or mesh it over a scene's
@@ -288,10 +289,10 @@ SPINDLE = "W0423":
 "`torus(R, r)` has a ring with the radius R and a section with the radius r. If r is larger than R it cuts itself along the axis:
 it has no hole, and looks like an apple. Most often the two are exchanged: `torus(1, 0.2)` is a slender ring.";
 THIN_FOR_EDGES = "W0424":
-"`.round(r)` makes arcs of the edges of a shape, and a part that is thinner than 2r has no room for two of them. It ends in the
-middle of its thickness T by r − √(r² − (r − T/2)²) short of where it ended. A part that is so thin in one direction keeps its faces; one
-that is so thin in all directions keeps none and becomes smaller: a cube of 1 m with `.round(0.6)` is 0.97 m wide, with `.round(0.8)`
-0.76 m.
+"`.round(r)` makes arcs of the edges of a shape, and a part that is thinner than 2r has no room for two of them. It ends
+in the middle of its thickness T by r − √(r² − (r − T/2)²) short of where it ended. A part that is so thin in one
+direction keeps its faces; one that is so thin in all directions keeps none and becomes smaller: a cube of 1 m with
+`.round(0.6)` is 0.97 m wide, with `.round(0.8)` 0.76 m.
 
     rfm 1
     solid plate = box([0, 0, 0], [4, 3, 0.2]).round(0.15)    # 0.2 thick: a radius of 0.1 keeps its length";
@@ -307,13 +308,13 @@ FLUID_LIGHTER = "W0507":
 pack its particles at the start, and make them lighter: by 5 % at least, because particles that have left their lattice need
 more room, and by more where those at curved walls would be too dense otherwise. Forces and momentum are smaller by as much. More particles leave smaller gaps; `method: wcsph` keeps all of the mass.";
 THIN_FOR_PARTICLES = "W0508":
-"A gap of an obstacle is thinner than two spacings of the particles, or a wall thinner than half of one. Particles keep half a spacing
-from each face and fill what is left in whole layers: under a head of thirty spacings a gap of 2 spacings holds 93 % of what it should, one
-of 1.5 spacings 66 %, one of 1 spacing 51 %, and a thinner one nothing. Through such a wall the fluid on one side feels that on the other more than its own second neighbours. Of a wall whose
-load a probe measures it is told if it is thinner than one and a half spacings: kernels before it reach beyond it, and where
-nothing is behind it the fluid is pressed against it harder than it should be. The message says how thin it is, where, and what
-spacing is small enough. Parts that extend over less than two spacings, and the tips of wedges, do
-not count.";
+"A gap of an obstacle is thinner than two spacings of the particles, or a wall thinner than half of one. Particles keep
+half a spacing from each face and fill what is left in whole layers: under a head of thirty spacings a gap of 2 spacings
+holds 93 % of what it should, one of 1.5 spacings 66 %, one of 1 spacing 51 %, and a thinner one nothing. Through such a
+wall the fluid on one side feels that on the other more than its own second neighbours. Of a wall whose load a probe
+measures it is told if it is thinner than one and a half spacings: kernels before it reach beyond it, and where nothing
+is behind it the fluid is pressed against it harder than it should be. The message says how thin it is, where, and what
+spacing is small enough. Parts that extend over less than two spacings, and the tips of wedges, do not count.";
 DRY_WALL = "W0518":
 "The fluid's shape tapers off between an obstacle and another wall, and becomes thinner than a particle: below a cylinder that
 lies on a floor, in a narrow wedge, or in a gap. Particles keep half a spacing from walls, so such places stay empty, nothing
@@ -391,10 +392,10 @@ FLUID_OF_TIME = "W0522":
 has no effect on them later. Obstacles and the container may move; a fluid gets its motion from its `velocity`, from gravity and
 from them.";
 CLAMPED = "W0523":
-"In a fluid that fills all its room, wcsph takes gradients by differences and keeps negative pressures, because only differences of
-pressure matter there. `shifting: 0` and `gradients: pairs` rule out the differences, and with pairs negative pressures are cut off at zero
-unless the scene says `negative_pressure: keep`. Waves of sound and flows around bodies come out wrong then. Stating `negative_pressure`
-either way silences the warning.";
+"In a fluid that fills all its room, wcsph takes gradients by differences and keeps negative pressures, because only
+differences of pressure matter there. `shifting: 0` and `gradients: pairs` rule out the differences, and with pairs
+negative pressures are cut off at zero unless the scene says `negative_pressure: keep`. Waves of sound and flows around
+bodies come out wrong then. Stating `negative_pressure` either way silences the warning.";
 OBSTACLE_FILLS_BOX = "E0502":
 "The obstacle covers every place where fluid was to be put: nothing is left to simulate.";
 }

@@ -30,8 +30,8 @@ const THIN_WALL: f64 = 0.5;
 /// 5 % too large at 1.4 spacings.
 const LOADED_WALL: f64 = 1.5;
 
-/// Gaps that are thinner than this part of the spacing are reported. Particles stay half a spacing away from each face and
-/// fill what is left in whole layers: under a head of thirty spacings a gap of 1 spacing holds 51 % of what it
+/// Gaps that are thinner than this part of the spacing are reported. Particles stay half a spacing away from each face
+/// and fill what is left in whole layers: under a head of thirty spacings a gap of 1 spacing holds 51 % of what it
 /// should, of 1.5 spacings 66 %, of 2 spacings 93 %, and of 2.5 spacings 99 %.
 const THIN_GAP: f64 = 2.0;
 

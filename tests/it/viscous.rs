@@ -212,7 +212,8 @@ fn differences_are_chosen_for_fluids_without_a_surface() {
     assert_eq!(gradients_of(0.9, "gradients: differences"), Gradients::Differences);
 }
 
-/// What rules out differences in a full room also cuts off negative pressures, and that is told unless the scene says so.
+/// What rules out differences in a full room also cuts off negative pressures, and that is told unless the scene says
+/// so.
 #[test]
 fn pressures_that_are_cut_off_in_a_full_room_are_told() {
     for (level, keys, told) in [

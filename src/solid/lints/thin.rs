@@ -71,13 +71,13 @@ const OPPOSITE: f64 = -0.98;
 const LEAST_EXTENT: f64 = 2.0;
 
 impl Solid {
-    /// The thinnest wall and the thinnest gap of the solid that are thinner than a length each, and extend
-    /// over twice the length of the wall, and twice the third length; `None` where there is none. Very large solids are not looked at, nor
-    /// are those without bounds in a box without them.
+    /// The thinnest wall and the thinnest gap of the solid that are thinner than a length each, and extend over twice
+    /// the length of the wall, and twice the third length; `None` where there is none. Very large solids are not looked
+    /// at, nor are those without bounds in a box without them.
     ///
-    /// A fluid may be in a finite box. Both faces of a gap must lie in it, and beyond both faces of a wall
-    /// there must be as much room in it as the third length. The search takes its operations from a budget; if too
-    /// few are left, it finds nothing.
+    /// A fluid may be in a finite box. Both faces of a gap must lie in it, and beyond both faces of a wall there must
+    /// be as much room in it as the third length. The search takes its operations from a budget; if too few are left,
+    /// it finds nothing.
     pub fn thin_parts(
         &self,
         [wall, gap, room]: [f64; 3],

@@ -146,8 +146,8 @@ impl Wcsph {
         })
     }
 
-    /// The key that rules out differences of pressure where they would be the default, so that negative pressures are cut
-    /// off although nothing says so.
+    /// The key that rules out differences of pressure where they would be the default, so that negative pressures are
+    /// cut off although nothing says so.
     pub(crate) fn clamped_by(&self) -> Option<&'static str> {
         let key = match (self.gradients, self.shifting) {
             (Some(Gradients::Pairs), _) => Some("gradients: pairs"),
