@@ -223,7 +223,8 @@ impl Core {
 
     /// For each axis the part of the kernel's moment at a particle that lies behind the walls of the box across it.
     pub fn box_moments(&self, i: usize) -> DVec3 {
-        self.boundary.box_moments(&self.wall, self.particles.position.get(i))
+        let wet = self.wet.get(i).copied().unwrap_or(1.0);
+        wet * self.boundary.box_moments(&self.wall, self.particles.position.get(i))
     }
 
     /// Gravity at a particle, m/s², at the end of the present step.

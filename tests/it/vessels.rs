@@ -163,33 +163,42 @@ fn sound_is_fast_enough_for_what_comes() {
 }
 
 /// Water in a vessel that may move, whose faces lie in walls of the box, one of them or all, or less than a spacing
-/// before its floor. Nothing moves, so the water rests as it does in a vessel that is nowhere near the box.
-/// (Walls counted twice where the vessel's own walls meet: it swirled with 2 to 10 cm/s, and stood 6 mm too high.)
+/// before its floor. Nothing moves, so the water rests as it does in a vessel that is nowhere near the box. (Walls
+/// counted twice where the vessel's own walls meet: it swirled with 2 to 10 cm/s, with `dfsph` 18 cm/s, and stood 6 mm
+/// too high.)
 #[test]
 fn water_rests_in_a_moving_vessel_whose_faces_lie_in_the_box() {
     let free = ("[-0.1, -0.1, -0.1]", "[0.6, 0.3, 0.6]");
     let floor = ("[-0.1, -0.1, 0]", "[0.6, 0.3, 0.6]");
     let all = ("[0, 0, 0]", "[0.5, 0.2, 0.6]");
     let before_floor = ("[-0.1, -0.1, -0.01]", "[0.6, 0.3, 0.6]");
-    for (min, max) in [free, floor, all, before_floor] {
-        let mut simulation = simulation(&format!(
-            "rfm 1
+    // divergence-free water never quite rests, and how much it moves is a matter of chance
+    for (method, start, factor) in [("wcsph", ", start: hydrostatic", 2.0), ("dfsph", "", 4.0)] {
+        let mut at_best = None;
+        for (min, max) in [free, floor, all, before_floor] {
+            let mut simulation = simulation(&format!(
+                "rfm 1
 scene still {{
   box {{ min: {min}, max: {max} }}
   container {{ solid: box([0, 0, 0], [0.5, 0.2, 0.5]).move([0*t, 0, 0]) }}
-  fluid water {{ shape: box([0, 0, 0], [0.5, 0.2, 0.2]), density: 1000, spacing: 0.025, start: hydrostatic }}
-  method: wcsph
+  fluid water {{ shape: box([0, 0, 0], [0.5, 0.2, 0.2]), density: 1000, spacing: 0.025{start} }}
+  method: {method}
   run {{ until: 1 s, save_every: 0.5 s }}
 }}"
-        ));
-        run_to(&mut simulation, 0.6);
-        let velocity = &simulation.particles().velocity;
-        let squares = velocity.iter().map(|v| v.length_squared()).sum::<f64>();
-        let speed = (squares / velocity.iter().count() as f64).sqrt();
-        println!("box from {min}: {:.2} mm/s, middle at {:.5} m", 1e3 * speed, middle(&simulation).z);
-        assert!(speed < 1.5e-3, "box from {min}: {speed} m/s");
-        assert!((middle(&simulation).z - 0.1).abs() < 5e-4, "box from {min}: {}", middle(&simulation).z);
-        assert_eq!(simulation.findings(), [], "box from {min}");
+            ));
+            run_to(&mut simulation, 0.6);
+            let velocity = &simulation.particles().velocity;
+            let squares = velocity.iter().map(|v| v.length_squared()).sum::<f64>();
+            let speed = (squares / velocity.iter().count() as f64).sqrt();
+            let height = middle(&simulation).z;
+            println!("{method}, box from {min}: {:.2} mm/s, middle at {height:.5} m", 1e3 * speed);
+            let [slowest, level] = *at_best.get_or_insert([speed, height]);
+            assert!(speed < factor * slowest, "{method}, box from {min}: {speed} m/s beside {slowest}");
+            // a hundredth of a layer of particles, or five with dfsph
+            let most = 0.025 * if method == "wcsph" { 0.01 } else { 0.05 };
+            assert!((height - level).abs() < most, "{method}, box from {min}: {height} m beside {level}");
+            assert_eq!(simulation.findings(), [], "{method}, box from {min}");
+        }
     }
 }
 

@@ -44,6 +44,7 @@ pub use dfsph::Dfsph;
 pub use negative_pressure::NegativePressure;
 pub use paper::Paper;
 pub use reference::{method_reference, methods_overview, methods_reference};
+pub(crate) use wcsph::ClampedBy;
 pub use wcsph::{Gradients, Wcsph};
 
 use declaration::{Declaration, check, read, words};

@@ -26,7 +26,7 @@ use glam::DVec3;
 use super::{
     bodies_of_fluid,
     crowding::Crowding,
-    wetting::{Wetting, from_image},
+    wetting::{Image, Wetting, from_image},
 };
 use crate::sph::{
     core::Core,
@@ -163,8 +163,8 @@ impl PairPass<4, 6, 7> for WithImages<Normals<'_>> {
         let crowding = self.0.crowding;
         let (mut fluid, mut image) = ([*fx, *fy, *fz], [*ix, *iy, *iz]);
         crowding.add(d, r2, &mut fluid);
-        let (d, r2) = from_image(plane, d, r2);
-        crowding.add(d, r2, &mut image);
+        let mirrored = from_image(plane, d, r2);
+        crowding.add(mirrored.d, mirrored.r2, &mut image);
         ([*fx, *fy, *fz], [*ix, *iy, *iz]) = (fluid, image);
     }
 
@@ -253,8 +253,8 @@ impl PairPass<8, 2, 3> for WithImages<Curvature<'_>> {
     ) {
         let own = [dx, dy, dz, weight];
         self.0.bend(d, r2, &own, [ox, oy, oz, other_weight], sums);
-        let (d, r2) = from_image(&[x, y, z, distance], d, r2);
-        let across = z.mul_add(oz, y.mul_add(oy, x * ox));
+        let Image { d, r2, is_mirrored } = from_image(&[x, y, z, distance], d, r2);
+        let across = z.mul_add(oz, y.mul_add(oy, x * ox)) * is_mirrored;
         let twice = across + across;
         let image = [ox - twice * x, oy - twice * y, oz - twice * z, other_weight];
         self.0.bend(d, r2, &own, image, sums);

@@ -42,7 +42,7 @@ pub(super) struct Plane {
 /// The distance of a plane whose images are out of reach, in support radii.
 const OUT_OF_REACH: f64 = 2.0;
 
-/// Sums of particles in disorder differ from those of a lattice by this much.
+/// Sums of particles in disorder are this much less than those of a lattice, in parts. What is whole up to that is whole.
 const DISORDER: f64 = 0.05;
 
 impl Plane {
@@ -58,13 +58,15 @@ impl Wetting {
     pub fn find(&mut self, core: &mut Core) {
         let (n, h) = (core.particles.len(), core.parameters.support_radius);
         self.walls.find(core, |i| Some(Plane::of(core.wall(), &core.coverage_by_whole_walls(i)?)));
-        self.normal = Vectors::default();
-        self.normal.resize(n);
-        self.distance.clear();
-        self.distance.resize(n, OUT_OF_REACH * h);
         if !self.any() {
             return;
         }
+        for component in self.normal.components_mut() {
+            component.clear();
+        }
+        self.normal.resize(n);
+        self.distance.clear();
+        self.distance.resize(n, OUT_OF_REACH * h);
         for (i, plane) in self.walls.found() {
             let i = *i as usize;
             self.normal.set(i, plane.normal);
@@ -75,7 +77,8 @@ impl Wetting {
         let volume = parameters.particle_mass / parameters.rest_density;
         let whole = Wendland::lattice_sum(h / parameters.spacing());
         let pass = Fullness { kernel, weight: kernel.weight * volume / whole, walls: &self.walls };
-        let mut wet = vec![0.0; n];
+        let mut wet = std::mem::take(&mut core.wet);
+        wet.resize(n, 0.0);
         core.sum(&pass, self.planes(), [&mut wet]);
         core.wet = wet;
     }
@@ -126,31 +129,48 @@ impl PairPass<4, 2, 1> for Fullness<'_> {
             // 1 + 4q = 5 − 4s
             f * f * s.mul_add(of(-4.0), of(5.0))
         };
-        let (_, image2) = from_image(plane, d, r2);
+        let Image { r2: image, .. } = from_image(plane, d, r2);
         sums[0] += weight(r2);
-        sums[1] += weight(image2);
+        sums[1] += weight(image);
     }
 
     fn finish(&self, i: usize, sums: [f64; 2]) -> [f64; 1] {
         let Some(plane) = self.walls.near(i) else { return [1.0] };
         let wall = plane.filled;
         let [fluid, image] = sums.map(|sum| self.weight * sum);
+        // in corners and gaps more than half a kernel may lie behind walls, and then little fluid has room
         let wet = (image / wall).max(fluid / (1.0 - wall).max(wall));
         [((1.0 + DISORDER) * wet).min(1.0)]
     }
 }
 
-/// The way from the image of a neighbour in a plane, and its square; `d` is the way from the neighbour itself.
+/// The image of a neighbour in a plane.
+pub(super) struct Image<V> {
+    /// The way from it.
+    pub d: [V; 3],
+    /// Its square.
+    pub r2: V,
+    /// 1 if it is the neighbour's mirror image, 0 if the neighbour is behind the plane, as at a curved wall, and is its
+    /// own image.
+    pub is_mirrored: V,
+}
+
+/// The image in a plane of the neighbour from which the way `d` comes, with its square.
 #[inline(always)]
 pub(super) fn from_image<S: Simd, V: SimdFloat<S, Element: Real>>(
     &[x, y, z, distance]: &[V; 4],
     d: [V; 3],
     r2: V,
-) -> ([V; 3], V) {
+) -> Image<V> {
+    let of = V::Element::of;
     let across = z.mul_add(d[2], y.mul_add(d[1], x * d[0]));
-    // what is behind the plane, as at a curved wall, is its own image
     let before = distance - across;
     let twice = before + before.abs();
-    let image = [twice.mul_add(x, d[0]), twice.mul_add(y, d[1]), twice.mul_add(z, d[2])];
-    (image, twice.mul_add(across + across + twice, r2))
+    let way = [twice.mul_add(x, d[0]), twice.mul_add(y, d[1]), twice.mul_add(z, d[2])];
+    // rounding must not make a root of less than nothing
+    let square = twice.mul_add(across + across + twice, r2).max(of(0.0));
+    Image { d: way, r2: square, is_mirrored: (twice * of(MANY)).min(of(1.0)) }
 }
+
+/// Makes one or more of any length, m, that is not zero.
+const MANY: f64 = 1e30;

@@ -375,6 +375,24 @@ mod tests {
         Part::Face(Face { distance, normal: normal.normalize(), mean_curvature: 0.0 })
     }
 
+    #[test]
+    fn a_part_of_walls_is_that_part_of_all_they_do() {
+        let wall = Wall { viscous_forces: ViscousForces::WithSpin, ..WALL };
+        let faces = [Part::Any(2), face(0.1, DVec3::Z), face(0.05, DVec3::new(1.0, 0.2, 0.0))];
+        let mut whole = Coverage::of_faces(&wall, &faces.into_iter().collect());
+        whole.set_in_motion(DVec3::new(0.3, -0.4, 0.2));
+        whole.friction.take_along(DVec3::new(0.3, -0.4, 0.2), DVec3::Y);
+        assert_eq!(whole.in_part(1.0), whole);
+        let quarter = whole.in_part(0.25);
+        assert_eq!(quarter.part, 0.25 * whole.part);
+        assert_eq!(quarter.barrier.gradient, 0.25 * whole.barrier.gradient);
+        assert_eq!(quarter.in_part(4.0), whole);
+        // what the fluid does behind a part of a wall is what it does behind the wall
+        let along = DVec3::new(0.1, 0.2, 0.3);
+        let (behind, of_part) = (whole.velocity_behind(along), quarter.velocity_behind(along));
+        assert!((behind - of_part).length() < 1e-12, "{behind} {of_part}");
+    }
+
     /// Integrals of W, ∇W and y ⊗ ∇W over a region, by brute force on a grid of the support's box.
     fn brute_force(inside: impl Fn(DVec3) -> bool) -> (f64, DVec3, DMat3) {
         const N: i32 = 96;

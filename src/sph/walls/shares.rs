@@ -329,7 +329,8 @@ impl Boundary {
             Near { obstacle, part, gradient, moment, sticks: slip == Slip::No, friction }
         };
         let mut found: SmallVec<[Near; 4]> = SmallVec::new();
-        let of_box = self.of_box::<WallDrag, ()>(wall, p);
+        // walls behind obstacles are found by their faces below
+        let of_box = self.of_whole_box::<WallDrag, ()>(wall, p);
         if of_box.part > 0.0 {
             found.push(near(None, &of_box));
         }

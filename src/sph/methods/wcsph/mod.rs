@@ -81,6 +81,17 @@ pub struct Wcsph {
     pub hydrostatic_start: bool,
 }
 
+/// The keys that rule out differences of pressure.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum ClampedBy {
+    /// `gradients: pairs`
+    Pairs,
+    /// `shifting: 0`, without which there are no differences.
+    NoShifting,
+    /// Both of them.
+    Both,
+}
+
 impl Wcsph {
     /// δ of the density diffusion, stated or derived. Surface tension acts on a layer of particles, so the
     /// density grows with the depth in that layer. Diffusion levels this growth out of step with the motion,
@@ -146,15 +157,16 @@ impl Wcsph {
         })
     }
 
-    /// The key that rules out differences of pressure where they would be the default, so that negative pressures are
-    /// cut off although nothing says so.
-    pub(crate) fn clamped_by(&self) -> Option<&'static str> {
-        let key = match (self.gradients, self.shifting) {
-            (Some(Gradients::Pairs), _) => Some("gradients: pairs"),
-            (None, Some(0.0)) => Some("shifting: 0"),
+    /// What rules out differences of pressure where they would be the default, so that negative pressures are cut off
+    /// although nothing says so.
+    pub(crate) fn clamped_by(&self) -> Option<ClampedBy> {
+        let by = match (self.gradients, self.shifting) {
+            (Some(Gradients::Pairs), Some(0.0)) => Some(ClampedBy::Both),
+            (Some(Gradients::Pairs), _) => Some(ClampedBy::Pairs),
+            (None, Some(0.0)) => Some(ClampedBy::NoShifting),
             (None | Some(Gradients::Differences), _) => None,
         };
-        key.filter(|_| self.negative_pressure.is_none())
+        by.filter(|_| self.negative_pressure.is_none())
     }
 
     /// The strength of the shifting, stated or derived.

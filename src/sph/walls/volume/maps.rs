@@ -44,6 +44,8 @@ pub(in crate::sph) struct Maps {
     at_rest: Option<VolumeMap>,
     /// For each obstacle, where it is to be found.
     bodies: Vec<Body>,
+    /// Whether any body moves without changing its shape.
+    any_moves: bool,
 }
 
 enum Body {
@@ -136,7 +138,9 @@ impl Maps {
             }
             None | Some(_) => Body::Unknown,
         };
-        let mut maps = Self { bodies: obstacles.iter().map(body).collect(), at_rest };
+        let bodies: Vec<Body> = obstacles.iter().map(body).collect();
+        let any_moves = bodies.iter().any(|body| matches!(body, Body::Whole(_) | Body::Parts(_)));
+        let mut maps = Self { bodies, at_rest, any_moves };
         maps.move_to(time, time);
         maps
     }
@@ -171,7 +175,7 @@ impl Maps {
 
     /// Whether any body moves without changing its shape.
     pub fn any_moves(&self) -> bool {
-        self.bodies.iter().any(|body| matches!(body, Body::Whole(_) | Body::Parts(_)))
+        self.any_moves
     }
 
     /// The part of the kernel at any place that an obstacle takes which moves without changing its shape; 0 if it does
