@@ -126,7 +126,7 @@ fn thin(
         }
         ("wall", _) => ", so that fluids on its two sides push one another through it",
         (_, 1.0..) => ", so that it holds less than it should: about 93 % at 2 times, 66 % at 1.5, 51 % at 1",
-        _ => ", so that less flows through it than should",
+        _ => ", so that it holds half of what it should, or nothing",
     };
     let DVec3 { x, y, z } = to_thousandths(part.at);
     let point = format!("[{x:.3}, {y:.3}, {z:.3}]");

@@ -7,7 +7,7 @@ use crate::Program;
 use crate::diagnostic::{Code, Diagnostic};
 use crate::ir::Node;
 use crate::lower::{Gravity, Scene};
-use crate::sph::{Method, Parameters, Slip};
+use crate::sph::{ClampedBy, Method, Parameters, Slip};
 
 /// The length of a simulation's steps, and where it comes from.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -149,20 +149,22 @@ pub(super) fn slow_sound(scene: &Scene, parameters: &Parameters) -> Option<Diagn
 /// A warning if negative pressures are cut off in a fluid that fills its room, only because of another key.
 pub(super) fn clamped(scene: &Scene, method: &Method, has_surface: &dyn Fn() -> bool) -> Option<Diagnostic> {
     let Method::Wcsph(wcsph) = method else { return None };
-    let key = wcsph.clamped_by().filter(|_| !has_surface())?;
-    let others = match key {
-        "shifting: 0" => "`gradients` are pairs and `negative_pressure` is clamp",
-        _ => "`negative_pressure` is clamp",
+    let by = wcsph.clamped_by().filter(|_| !has_surface())?;
+    let (key, others, help) = match by {
+        ClampedBy::Pairs => ("gradients: pairs", "`negative_pressure` is clamp", "leave `gradients` out"),
+        ClampedBy::NoShifting => (
+            "shifting: 0",
+            "`gradients` are pairs and `negative_pressure` is clamp",
+            "leave `shifting` out, write `gradients: differences` beside it",
+        ),
+        ClampedBy::Both => {
+            ("gradients: pairs", "`negative_pressure` is clamp", "leave `gradients` and `shifting` out")
+        }
     };
     let message = format!(
         "the fluid fills all its room, and with `{key}` {others}: pressures below zero, as in half of a sound wave or behind a body, are cut off"
     );
-    let help = match key {
-        "shifting: 0" => {
-            "leave `shifting` out, write `gradients: differences` beside it, or state what is meant: `negative_pressure: clamp` or `keep`"
-        }
-        _ => "leave `gradients` out, or state what is meant: `negative_pressure: clamp` or `keep`",
-    };
+    let help = format!("{help}, or state what is meant: `negative_pressure: clamp` or `keep`");
     Some(Diagnostic::warning(Code::CLAMPED, scene.fluid.shape_span, message).help(help))
 }
 

@@ -55,7 +55,7 @@ impl Lowering<'_> {
             }
             Profile::Quadratic { at_surface, second } => {
                 let bent = second.filter(|second| *second < 0.0);
-                // there the slope is zero
+                // the depth at which the slope has fallen to zero
                 let greatest = bent.map_or(f64::INFINITY, |second| at_surface / -second);
                 let at_surface = self.constant(if is_one(at_surface) { 1.0 } else { at_surface });
                 let slope = self.slope_of_leaf(leaf, span);
@@ -74,7 +74,8 @@ impl Lowering<'_> {
     }
 
     /// (k − √(k² + 2cω))/−c, where k is the slope on the surface and c = ∂²ω/∂n² is the same everywhere. It is
-    /// 2ω/(g + k) without g, of which no range is known where it divides by what may be zero, as on the axis of a torus.
+    /// 2ω/(g + k) without g, of which no range is known where it divides by what may be zero, as on the axis of a
+    /// torus. Here ω stands once, so the range is exact, and bounds are found. Within rounding of the surface it is zero.
     fn distance_by_root(&mut self, leaf: Node, at_surface: Node, second: f64, span: Span) -> Node {
         let [zero, twice, curved] = [0.0, 2.0 * second, -second].map(|number| self.constant(number));
         let square = self.binary(Binary::Mul, at_surface, at_surface, span);
@@ -111,13 +112,14 @@ impl Lowering<'_> {
     }
 
     /// Examines the slope of a part at some places within a cube, with the present params and with others.
-    /// Whatever is found here, the distance has the right sign. Its value is wrong where a formula in pieces
+    /// Whatever is found here, the distance has the right sign, but for rounding at the surface. Its value is wrong where a formula in pieces
     /// has another slope than at all of these places, and an offset is then wrong by as much.
     fn profile(&self, leaf: Node, middle: [f64; 3], half: f64) -> Profile {
         let (mut graph, leaf) = self.module.graph.extract_cone(leaf);
         let slopes = Slopes::of(&mut graph, leaf);
         let params: Vec<f64> = self.module.params.iter().map(|param| param.value).collect();
-        let others: Vec<f64> = params.iter().map(|value| 1.37 * value).collect();
+        let others: Vec<f64> =
+            params.iter().map(|value| if *value == 0.0 { 0.1 } else { 1.37 * value }).collect();
         let has_params = !graph.parameters(leaf).is_empty();
         let mut found = Vec::new();
         for i in 0..PLACES {

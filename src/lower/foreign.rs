@@ -234,7 +234,7 @@ fn joined(name: &str, a: &[&str]) -> Option<Words> {
         "onion" | "thicken" | "hollow" => written("`.shell` here", "sphere(1).shell(0.1)"),
         "hull" | "convex_hull" => words(
             "there are no hulls here",
-            "the hull of two equal balls is `capsule(0.1, 1)`, that of many along a path `sweep([[0, 0, 0], [1, 0, 0], [1, 1, 0]], 0.1)`, \
+            "the hull of two equal balls is `capsule(0.1, 1)`, those of each two along a path `sweep([[0, 0, 0], [1, 0, 0], [1, 1, 0]], 0.1)`, \
              that of two outlines at two heights `polygon([[0, 0], [1, 0], [0, 1]]).loft(polygon([[0, 0], [1, 0], [1, 1]]), 0, 1)`",
         ),
         "minkowski" => words(

@@ -176,7 +176,8 @@ impl Lowering<'_> {
     }
 
     /// The distance from the surface of a part: exact where that follows from its slope, and otherwise
-    /// ω/√(g² + (ω/8r)²), which is right to first order. It has the sign of the part's field everywhere.
+    /// ω/√(g² + (ω/8r)²), which is right to first order. It has the sign of the part's field, but for
+    /// rounding at the surface.
     fn distance(&mut self, leaf: Node, within: Option<Aabb>, radii: &Radii, span: Span) -> Known {
         if let Some(distance) = self.exact_distance(leaf, (within, 4.0 * radii.length), span) {
             return distance;

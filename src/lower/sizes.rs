@@ -41,7 +41,7 @@ impl Lowering<'_> {
 
     /// Warns of a radius of edges that is larger than half of the thickness of a part which they end.
     pub fn warn_of_thin_part(&mut self, half: f64, radius: f64, span: Span) {
-        // of the square root of a sum
+        // `half` comes from the root of a sum, which rounds
         const ROUNDING: f64 = 1e-9;
         if self.has_open_params || radius <= half * (1.0 + ROUNDING) {
             return;
@@ -49,7 +49,7 @@ impl Lowering<'_> {
         // what the arc leaves out in the middle of the thickness
         let lost = radius - (radius * radius - (radius - half).powi(2)).sqrt();
         let message = format!(
-            "a part is {} thick, less than two radii of {radius}: it ends at least {} before its face",
+            "a part is {} thick, less than two radii of {radius}: where it meets another face, it ends at least {} before it",
             short(2.0 * half),
             short(lost)
         );

@@ -102,11 +102,13 @@ pub fn of_a_profile(name: &str, arguments: &str) -> Option<String> {
     match name {
         "rotate_extrude" => Some(".revolve()".into()),
         "linear_extrude" => {
-            let first = arguments.split(',').next().unwrap_or_default();
-            let height =
-                first.trim().strip_prefix("height").map_or(first, |rest| rest.trim().trim_start_matches('='));
-            let height = height.trim();
-            let height = if height.is_empty() || height.contains('=') { "1" } else { height };
+            let named = |part: &'_ str| {
+                part.split_once('=').map(|(name, value)| (name.trim().to_owned(), value.trim().to_owned()))
+            };
+            let by_name = arguments.split(',').filter_map(named).find(|(name, _)| name == "height");
+            let first = arguments.split(',').next().unwrap_or_default().trim();
+            let plain = (!first.is_empty() && !first.contains('=')).then(|| first.to_owned());
+            let height = by_name.map(|(_, value)| value).or(plain).unwrap_or_else(|| "1".into());
             Some(format!(".extrude(0, {height})"))
         }
         _ => None,

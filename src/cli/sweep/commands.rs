@@ -24,8 +24,8 @@ fn task<'a>(
     Task { shared, command, file, sweeps: &sweep.sweep, folder, options, resume, force }
 }
 
-/// The path within a folder that was asked for. Of one that leads elsewhere, only the name is kept.
-fn within(folder: &Path, asked: Option<&PathBuf>) -> Option<PathBuf> {
+/// The path within a folder that was asked for, whose folders are made. A path that leads elsewhere keeps only its name.
+fn made_within(folder: &Path, asked: Option<&PathBuf>) -> Option<PathBuf> {
     let is_below = |part: Component<'_>| matches!(part, Component::Normal(_) | Component::CurDir);
     asked.map(|path| match path.components().all(is_below) {
         true => {
@@ -69,7 +69,7 @@ pub(in crate::cli) fn check(shared: &Shared, options: &Check) -> Result<(), Fail
     task(shared, Command::Check, file, &options.sweep, again, format!("{single:?}")).go(|shared, folder| {
         let slice = PathBuf::from("slice.svg");
         let wanted = (!options.slice.is_empty()).then(|| options.output.as_ref().unwrap_or(&slice));
-        let output = wanted.and_then(|output| within(folder, Some(output)));
+        let output = wanted.and_then(|output| made_within(folder, Some(output)));
         checks::run(shared, &Check { output, ..single.clone() })
     })
 }
@@ -81,7 +81,7 @@ pub(in crate::cli) fn mesh(shared: &Shared, options: &Mesh) -> Result<(), Failur
     let again = [options.again.resume, options.again.force];
     task(shared, Command::Mesh, &options.file, &options.sweep, again, format!("{single:?}")).go(
         |shared, folder| {
-            let output = within(folder, options.output.as_ref());
+            let output = made_within(folder, options.output.as_ref());
             meshes::run(shared, &Mesh { output, ..single.clone() })
         },
     )
@@ -125,8 +125,8 @@ pub(in crate::cli) fn report(shared: &Shared, options: &Report) -> Result<(), Fa
     let single = Report { sweep: SweepOptions::default(), again: Default::default(), ..options.clone() };
     let again = [options.again.resume, options.again.force];
     task(shared, Command::Report, file, &options.sweep, again, format!("{single:?}")).go(|shared, folder| {
-        let [output, mesh_plot, html] =
-            [&options.output, &options.mesh_plot, &options.html].map(|path| within(folder, path.as_ref()));
+        let [output, mesh_plot, html] = [&options.output, &options.mesh_plot, &options.html]
+            .map(|path| made_within(folder, path.as_ref()));
         reports::run(shared, &Report { output, mesh_plot, html, ..single.clone() })
     })
 }

@@ -228,15 +228,17 @@ impl<'a> Lowering<'a> {
         let down = if key == "gravity" && !written.starts_with('-') { "-" } else { "" };
         let written = match key {
             "min" | "max" => format!("[{written}, {written}, {written}]"),
-            _ => match written.as_str() {
+            // a direction may be said by its axis
+            "normal" => match written.as_str() {
                 "x" => "[1, 0, 0]".into(),
                 "y" => "[0, 1, 0]".into(),
                 "z" => "[0, 0, 1]".into(),
                 "-x" => "[-1, 0, 0]".into(),
                 "-y" => "[0, -1, 0]".into(),
                 "-z" => "[0, 0, -1]".into(),
-                _ => format!("[0, 0, {down}{written}]"),
+                _ => format!("[0, 0, {written}]"),
             },
+            _ => format!("[0, 0, {down}{written}]"),
         };
         self.report(diagnostic.help(format!("write `{key}: {written}`")));
         None
