@@ -23,7 +23,7 @@
 use std::collections::HashMap;
 
 use glam::{DMat3, DVec3};
-use nalgebra::{Cholesky, Matrix3, Matrix6, Vector3, Vector6};
+use nalgebra::{ArrayStorage, Cholesky, Matrix3, Matrix6, Vector3, Vector6};
 
 use super::wetting::{Plane, Wetting};
 use crate::sph::{core::Core, particles::Vectors};
@@ -37,7 +37,7 @@ const LEAST_ROUND: f64 = 1e-6;
 const HOLD: f64 = 1e4;
 
 /// A body of fluid.
-#[derive(Clone, Copy, Default)]
+#[derive(Clone, Copy)]
 struct Body {
     touches_wall: bool,
     /// Q, with lengths in units of m.
@@ -58,7 +58,7 @@ struct Body {
 /// force of each particle over its mass, `weight` how far it belongs to the surface.
 pub(super) fn balance(core: &Core, wetting: &Wetting, force: &mut Vectors, weight: &[f64]) {
     let (of, count) = bodies(core);
-    let mut bodies = vec![Body::default(); count];
+    let mut bodies = vec![Body::NONE; count];
     let position = &core.particles.position;
     for (i, &k) in of.iter().enumerate() {
         let body = &mut bodies[k];
@@ -102,6 +102,17 @@ pub(super) fn balance(core: &Core, wetting: &Wetting, force: &mut Vectors, weigh
 }
 
 impl Body {
+    /// A body without particles. (The default of a matrix is not zero but one.)
+    const NONE: Self = Self {
+        touches_wall: false,
+        held: Matrix6::from_array_storage(ArrayStorage([[0.0; 6]; 6])),
+        weight: 0.0,
+        centre: DVec3::ZERO,
+        force: DVec3::ZERO,
+        torque: DVec3::ZERO,
+        inertia: DMat3::ZERO,
+    };
+
     /// α and β of a body that touches walls, from its force over its weight and its torque. `None` if they cannot be
     /// told, as for a body of one particle.
     fn slide(&self) -> Option<(DVec3, DVec3)> {
@@ -192,7 +203,7 @@ mod tests {
     fn loaded(particles: &[(DVec3, Option<DVec3>)], along: DVec3, around: DVec3) -> Body {
         let weight = particles.len() as f64;
         let centre = particles.iter().map(|(x, _)| x).sum::<DVec3>() / weight;
-        let mut body = Body { touches_wall: true, weight, centre, ..Body::default() };
+        let mut body = Body { touches_wall: true, weight, centre, ..Body::NONE };
         for (x, normal) in particles {
             let away = x - centre;
             let force = along + around.cross(away);

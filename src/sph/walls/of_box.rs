@@ -40,7 +40,7 @@ impl Boundary {
     /// An obstacle takes the part b of a ball of the size of a kernel that touches the wall from behind, and a of the
     /// kernel. It covers (b − a)/(1 − a) of the wall: all where b is 1, and nothing where it crosses the wall, because
     /// there a and b are the same. Of that, the first half is left to the angle between wall and obstacle, by which the
-    /// two are joined. (With all of it a floor that rises between the box's walls was 1.1 % too dense.)
+    /// two are joined. (With b itself in its place the water over a floor that rises was 1.1 % too dense.)
     fn bare(&self, wall: &Wall, p: DVec3, face: &Face) -> f64 {
         if !self.maps.any_moves() {
             return 1.0;
