@@ -112,8 +112,8 @@ impl Lowering<'_> {
     }
 
     /// Examines the slope of a part at some places within a cube, with the present params and with others.
-    /// Whatever is found here, the distance has the right sign, but for rounding at the surface. Its value is wrong where a formula in pieces
-    /// has another slope than at all of these places, and an offset is then wrong by as much.
+    /// Whatever is found here, the distance has the right sign, but for rounding at the surface. Its value is wrong
+    /// where a formula in pieces has another slope than at all of these places, and an offset is then wrong by as much.
     fn profile(&self, leaf: Node, middle: [f64; 3], half: f64) -> Profile {
         let (mut graph, leaf) = self.module.graph.extract_cone(leaf);
         let slopes = Slopes::of(&mut graph, leaf);
