@@ -37,6 +37,16 @@ pub enum Axis {
 impl Axis {
     /// The coordinates of a point.
     pub const SPACE: [Self; 3] = [Self::X, Self::Y, Self::Z];
+
+    /// Its place in a set of coordinates.
+    fn bit(self) -> u8 {
+        match self {
+            Self::X => 1,
+            Self::Y => 2,
+            Self::Z => 4,
+            Self::T => 8,
+        }
+    }
 }
 
 /// What a node is.
@@ -96,6 +106,8 @@ impl Expr {
 pub struct Graph {
     exprs: Vec<Expr>,
     spans: Vec<Option<Span>>,
+    /// On which coordinates each node depends, see [`Axis::bit`].
+    axes: Vec<u8>,
     interned: FxHashMap<Expr, Node>,
     /// See [`Lookup`]. Graphs that are made of one another share them.
     tables: Tables,
@@ -147,6 +159,8 @@ impl Graph {
         *self.interned.entry(expr.key()).or_insert_with(|| {
             // operands are u32 themselves, and the compiler's node budget is far below 2³²
             let node = Node(self.exprs.len() as u32);
+            let own = if let Expr::Coordinate(axis) = expr { axis.bit() } else { 0 };
+            self.axes.push(expr.operands().fold(own, |axes, operand| axes | self.axes[operand.index()]));
             self.exprs.push(expr);
             self.spans.push(span);
             node
@@ -295,8 +309,7 @@ impl Graph {
 
     /// Whether a coordinate occurs in what a root depends on.
     pub fn uses(&self, root: Node, axis: Axis) -> bool {
-        // most graphs have no time, and need not be walked to know it
-        self.find(Expr::Coordinate(axis)).is_some_and(|node| self.cone(root).binary_search(&node).is_ok())
+        self.axes[root.index()] & axis.bit() != 0
     }
 
     /// Whether time does.
@@ -342,26 +355,23 @@ impl Graph {
         image[&root]
     }
 
-    /// The value of a node that uses no coordinate and no parameter.
-    pub fn constant_value(&self, root: Node) -> Option<f64> {
-        self.value_with(root, &[])
-    }
-
-    /// The value of a node that uses no coordinate, with these values of parameters.
-    pub fn value_with(&self, root: Node, parameters: &[f64]) -> Option<f64> {
-        let mut values: FxHashMap<Node, f64> = FxHashMap::default();
-        for node in self.cone(root) {
-            let value = match self.expr(node) {
-                Expr::Constant(bits) => f64::from_bits(bits),
-                Expr::Parameter(i) => *parameters.get(i as usize)?,
-                Expr::Coordinate(_) | Expr::Uniform(_) => return None,
-                Expr::Unary(op, a) => op.eval(values[&a]),
-                Expr::Binary(op, a, b) => op.eval(values[&a], values[&b]),
-                Expr::Lookup(lookup, at) => lookup.eval(&self.tables, at.map(|node| values[&node])),
+    /// Adds the values of nodes that are not known yet to those of the nodes before them, with these values of
+    /// parameters. `None` for what uses a coordinate.
+    pub fn extend_values(&self, parameters: &[f64], values: &mut Vec<Option<f64>>) {
+        for &expr in &self.exprs[values.len().min(self.exprs.len())..] {
+            let of = |node: Node| values[node.index()];
+            let value = match expr {
+                Expr::Constant(bits) => Some(f64::from_bits(bits)),
+                Expr::Parameter(i) => parameters.get(i as usize).copied(),
+                Expr::Coordinate(_) | Expr::Uniform(_) => None,
+                Expr::Unary(op, a) => of(a).map(|a| op.eval(a)),
+                Expr::Binary(op, a, b) => of(a).zip(of(b)).map(|(a, b)| op.eval(a, b)),
+                Expr::Lookup(lookup, [x, y, z]) => {
+                    of(x).zip(of(y)).zip(of(z)).map(|((x, y), z)| lookup.eval(&self.tables, [x, y, z]))
+                }
             };
-            values.insert(node, value);
+            values.push(value);
         }
-        values.get(&root).copied()
     }
 
     /// A graph of its own for some roots, without what they do not use.
@@ -499,8 +509,9 @@ mod tests {
         let one = graph.constant(1.0);
         let two = graph.constant(2.0);
         let moved = graph.substitute(product, [one, two, z]);
-        assert_eq!(graph.constant_value(moved), Some(2.0));
-        assert_eq!(graph.constant_value(product), None);
+        let mut values = Vec::new();
+        graph.extend_values(&[], &mut values);
+        assert_eq!([moved, product].map(|node| values[node.index()]), [Some(2.0), None]);
     }
 
     #[test]

@@ -1,5 +1,6 @@
 //! The state of a lowering: the module so far, what was reported, and where an expression is evaluated.
 
+use std::cell::RefCell;
 use std::collections::{HashMap, HashSet};
 use std::sync::Arc;
 
@@ -31,6 +32,8 @@ pub struct KnownDimension {
 /// The state of a lowering.
 pub(super) struct Lowering<'a> {
     pub module: Module,
+    /// The values of the first nodes of the graph that have one, see [`Lowering::known_value`].
+    known: RefCell<Vec<Option<f64>>>,
     pub diagnostics: Vec<Diagnostic>,
     pub names: Names<'a>,
     pub scope: Scope,
@@ -105,6 +108,7 @@ impl Lowering<'_> {
     pub fn new(text: Arc<str>, max_nodes: usize) -> Self {
         Self {
             module: Module::default(),
+            known: RefCell::default(),
             diagnostics: Vec::new(),
             names: Names::default(),
             scope: Scope { source: SourceId::Prelude, locals: Vec::new(), calls: Vec::new() },
@@ -260,8 +264,13 @@ impl Lowering<'_> {
 
     /// The value that a node has with the present values of params; `None` if it depends on the place or on time.
     pub fn known_value(&self, node: Node) -> Option<f64> {
-        let values: Vec<f64> = self.module.params.iter().map(|param| param.value).collect();
-        self.module.graph.value_with(node, &values)
+        let mut known = self.known.borrow_mut();
+        // found once for each node: a chain of calls asks for each of its links
+        if known.len() <= node.index() {
+            let params: Vec<f64> = self.module.params.iter().map(|param| param.value).collect();
+            self.module.graph.extend_values(&params, &mut known);
+        }
+        known[node.index()]
     }
 
     /// Remembers that the values of the open params in a node have decided how a solid is built.

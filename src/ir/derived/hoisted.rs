@@ -63,13 +63,21 @@ impl Uniforms {
         self.interpreter.eval_given(Given { time, parameters, ..Given::point([f64::NAN; 3]) }, values);
     }
 
-    /// Their ranges over a stretch of time.
+    /// Their ranges over a stretch of time. At an instant these are their values, because all that uses them takes those:
+    /// the angle atan2(sin 0, −1) is π, and a range around the computed sine would reach to −π.
     pub fn over(&self, time: Interval, parameters: &[f64]) -> Vec<Interval> {
         if self.is_empty() {
             return Vec::new();
         }
         let all = self.ranges.all_with(&Region { time, parameters, ..Region::of(&Aabb::EMPTY) });
-        self.roots.iter().map(|root| all[root.index()]).collect()
+        let ranges = self.roots.iter().map(|root| all[root.index()]);
+        if time.lo < time.hi {
+            return ranges.collect();
+        }
+        let values = self.at(time.lo, parameters).into_iter();
+        let value =
+            |(range, value): (Interval, f64)| if value.is_finite() { Interval::point(value) } else { range };
+        ranges.zip(values).map(value).collect()
     }
 }
 

@@ -2,7 +2,10 @@
 
 use crate::geom::Aabb;
 use crate::interval::Interval;
-use crate::ir::{Contracted, Contractor, Graph, Node, Region, SignRule, Wanted, contract_linear};
+use crate::ir::{
+    Contracted, Contractor, Expr, Graph, Hoisted, Node, Outside, Region, SignRule, Wanted, contract_linear,
+    hoisted,
+};
 use crate::solid::construction::Solid;
 
 use super::search::{Effort, NODES_PER_WORK, SEARCH_RADIUS, Shrink};
@@ -30,6 +33,8 @@ impl WholeFormula {
     pub fn of(solid: &Solid, negated: bool) -> Self {
         let (graph, root) = solid.formula();
         let time = solid.moment.interval();
+        let now = (solid.moves() && time.lo == time.hi).then(|| at_instant(graph, root, time.lo));
+        let (graph, root) = now.as_ref().map_or((graph, root), |(graph, root)| (graph, *root));
         let hull = joined_boxes(graph, root, time, negated);
         Self { contractor: Contractor::new(graph, root), time, negated, hull }
     }
@@ -89,6 +94,22 @@ impl Shrink for WholeFormula {
     fn is_inside(known: &bool) -> bool {
         *known
     }
+}
+
+/// The formula at an instant: what depends on time alone is a number, which has no range.
+fn at_instant(graph: &Graph, root: Node, time: f64) -> (Graph, Node) {
+    let Hoisted { graph, outputs, uniforms, .. } = hoisted(graph, &[root], Outside::Time);
+    let values = uniforms.at(time, &[]);
+    let mut now = Graph::like(&graph);
+    let mut image: Vec<Node> = Vec::with_capacity(graph.len());
+    for (node, expr) in graph.nodes() {
+        let new = match expr {
+            Expr::Uniform(k) => Expr::Constant(values[k as usize].to_bits()),
+            _ => expr.map(|operand| image[operand.index()]),
+        };
+        image.push(now.intern(new, graph.span(node)));
+    }
+    (now, image[outputs[0].index()])
 }
 
 /// Where a junction is positive and where it is negative.
