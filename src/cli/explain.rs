@@ -88,6 +88,9 @@ pub(super) fn run(shared: &Shared, options: &Explain) -> Result<(), Failure> {
 }
 
 fn no_such_word(subject: &str) -> Failure {
+    if let Some(here) = rfm::lower::known_elsewhere(subject) {
+        return Failure::usage(format!("there is no word `{subject}`: {here}"));
+    }
     let names = page::names();
     let near = nearest(subject, names.iter().map(String::as_str));
     let near = near.map_or(String::new(), |near| format!("; did you mean `{near}`?"));

@@ -7,6 +7,14 @@ use crate::diagnostic::{Code, Diagnostic};
 use crate::syntax::ast::{Argument, Expr, ExprKind, Name};
 use crate::syntax::foreign;
 
+/// What to write for a function or method of another language; `None` if the name is not known from there.
+pub fn known_elsewhere(name: &str) -> Option<String> {
+    if let Some(method) = foreign::method(name) {
+        return Some(format!("it is the method `.{method}(…)` here (`rfm explain {method}`)"));
+    }
+    function(name, &[]).map(|Words { what, help }| format!("{what}; {help}"))
+}
+
 impl Lowering<'_> {
     /// The message for a call of a function that other languages have; `None` if the name is not known from there.
     pub fn foreign_function(&self, name: &Name, arguments: &[Argument]) -> Option<Diagnostic> {

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use super::lowering::Lowering;
 use super::names::Kind;
 use super::value::Value;
-use crate::diagnostic::{Code, Diagnostic, Source, SourceId, Span};
+use crate::diagnostic::{Code, Diagnostic, Source, SourceId, Span, nearest};
 use crate::files::Files;
 use crate::ir::{Axis, Expr as Operation, Lookup, Part};
 use crate::quantity::parse_unit;
@@ -77,6 +77,13 @@ impl<'a> Lowering<'a> {
             {
                 let units = format!("the parts of a unit are joined by `·`: `{}·{}`", unit.text, name.text);
                 return self.fail(diagnostic.help(format!("{units}; a viscosity may also be in `kg/m/s`")));
+            }
+            if self.is_shape(of) {
+                let methods = super::vocabulary::methods().map(|(method, _)| method);
+                let near = nearest(&name.text, methods).unwrap_or("move");
+                let message = format!("a shape has no part `{}`", name.text);
+                let help = format!("a method is called with brackets: `.{near}(…)`");
+                return self.fail(Diagnostic::error(Code::WRONG_TYPE, name.span, message).help(help));
             }
             return self.fail(match value {
                 Value::Vector(_) | Value::List(_) => diagnostic.help("a vector has .x, .y and .z"),
@@ -235,7 +242,9 @@ pub fn unread(path: &str, error: &crate::files::Unread, span: Span) -> Diagnosti
             diagnostic.help("move it beside the file, or allow it: --allow-outside on the command line")
         }
         Unread::Failed(_) => {
-            diagnostic.help("paths begin at the folder of the file in which they are written")
+            let paths = "paths begin at the folder of the file in which they are written";
+            let is_bare = std::path::Path::new(path).extension().is_none();
+            diagnostic.help(if is_bare { format!("write `{path}.rfm`? {paths}") } else { paths.to_string() })
         }
     }
 }

@@ -41,6 +41,7 @@ pub mod vocabulary;
 use std::collections::BTreeMap;
 use std::sync::OnceLock;
 
+pub use foreign::known_elsewhere;
 pub use imports::{Imported, unread};
 pub use module::{Module, NamedSolid, OpenParams, ParamValue};
 pub use scene::{

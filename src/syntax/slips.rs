@@ -110,6 +110,9 @@ impl<'t> Slip<'t> {
         if last_word(line) == "for" {
             return Some(self.fold_with_for());
         }
+        if let Some(fold) = self.fold_without_a_colon() {
+            return Some(fold);
+        }
         if called && line.ends_with(')') {
             return self.transform_in_front();
         }
@@ -255,6 +258,9 @@ impl<'t> Slip<'t> {
         }
         if let Some(start) = before.strip_suffix("..") {
             return Some(self.closed_range(last_number_or_word(start)));
+        }
+        if let Some(fold) = self.fold_with_equals() {
+            return Some(fold);
         }
         let value = self.after().trim_start();
         let key = last_word(before);

@@ -15,8 +15,9 @@ use rfm::solid::Bounds;
 const PROBES: u32 = 16;
 const MOST_UNKNOWN: usize = 50;
 
-/// The most cells that a solid is measured with that is too thin for the usual ones, and how often it gets more.
-const MOST_CELLS: usize = 512;
+/// The most cells on three faces of the bounds with which a solid is measured that is too thin for the usual ones, 512
+/// along each side of a cube, and how often it gets more.
+const MOST_ON_FACES: f64 = 3.0 * 512.0 * 512.0;
 const REFINED: usize = 3;
 
 /// What rounding may add to the sums over triangles, relative to them.
@@ -71,7 +72,8 @@ pub(super) fn measure(
         let is_known = solids != coarser || !no_thin_parts || thin.is_some_and(|thin| !thin.ended);
         facts.resolved = is_known.then_some(solids == coarser && no_thin_parts);
     }
-    if let Some(thin) = thin.filter(|_| facts.resolved == Some(false)) {
+    let is_missed = facts.resolved == Some(false) || by_meshes == ByMeshes::ShowNothing;
+    if let Some(thin) = thin.filter(|_| is_missed) {
         refine((solid, &*surface, bounds), (&grid, thin), watch, (&mut facts, notes));
     }
     // a part too thin for a cell would have been found
@@ -202,7 +204,8 @@ fn refine(
 ) {
     let mut needed = thin.cells_needed(grid);
     for _ in 0..REFINED {
-        let Some(cells) = needed.filter(|&cells| cells > VOLUME_CELLS && cells <= MOST_CELLS) else { return };
+        let can_be_had = |&cells: &usize| cells > VOLUME_CELLS && on_faces(bounds, cells) <= MOST_ON_FACES;
+        let Some(cells) = needed.filter(can_be_had) else { return };
         let Ok(grid) = Grid::around(bounds, Resolution::Cells(cells)) else { return };
         let no_time = format!(
             "there was no time to measure `{}` with the {cells} cells that show its thin parts; --budget gives it more",
@@ -226,6 +229,7 @@ fn refine(
             Ok(found) if found.solids == found.solids_coarser => {
                 take(&found, cells, facts);
                 facts.resolved = Some(true);
+                facts.no_volume = None;
             }
             Err(VolumeError::Mesh(MeshError::Ended)) => {
                 facts.wants_time = true;
@@ -236,6 +240,12 @@ fn refine(
         }
         return;
     }
+}
+
+/// How many cells three faces of some bounds have, with so many along the longest side.
+fn on_faces(bounds: &Aabb, cells: usize) -> f64 {
+    let [x, y, z] = (bounds.size() / bounds.size().max_element() * cells as f64).ceil().to_array();
+    x * y + y * z + z * x
 }
 
 /// What the finest mesh misses; `None` if the formula does not let it be found.

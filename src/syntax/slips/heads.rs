@@ -12,6 +12,7 @@ impl Slip<'_> {
     pub(super) fn mark_in_a_head(&self) -> Option<Diagnostic> {
         match self.found {
             "|" => self.absolute_value(),
+            "~" => self.tilde(),
             "{" => self.function_in_braces(),
             "," => self.two_variables(),
             "(" => self
@@ -36,6 +37,41 @@ impl Slip<'_> {
         (!self.ends_an_operand()).then(|| {
             self.unexpected().help(format!("the absolute value is a function: write `abs({inner})`"))
         })
+    }
+
+    /// `~a`
+    fn tilde(&self) -> Option<Diagnostic> {
+        let operand = self.after().lines().next()?;
+        let operand = operand.split_inclusive(')').next().unwrap_or(operand).trim();
+        let operand = if fits(&[operand]) && !operand.contains(',') { operand } else { "a" };
+        (!self.ends_an_operand())
+            .then(|| self.unexpected().help(format!("what is not in a shape is `not {operand}`, or `!{operand}`")))
+    }
+
+    /// `any i = 0..6: …`
+    pub(super) fn fold_with_equals(&self) -> Option<Diagnostic> {
+        let before = self.before();
+        let variable = last_word(before);
+        let fold = last_word(before.trim_end_matches(variable).trim_end());
+        let line = self.after().lines().next()?;
+        let range = line.split([':', ',']).next()?.trim();
+        let is_range = range.contains("..") || range.starts_with('[');
+        (FOLDS.contains(&fold) && !variable.is_empty() && is_range).then(|| {
+            let range = if fits(&[range]) && range.contains("..") { range } else { "0..6" };
+            self.unexpected().help(format!("a fold runs over a range: write `{fold} {variable} in {range}: …`"))
+        })
+    }
+
+    /// `any i in 0..6 sphere(1)`
+    pub(super) fn fold_without_a_colon(&self) -> Option<Diagnostic> {
+        let line = self.on_its_line();
+        let word = |fold: &&str| line.rfind(&format!("{fold} ")).map(|at| (at, fold.len()));
+        let (at, length) = FOLDS.iter().filter_map(word).max()?;
+        let head = line[at..].trim();
+        let (variable, range) = head[length..].trim_start().split_once(" in ")?;
+        let is_head = last_word(variable) == variable && !head.contains([':', '(']) && !range.is_empty();
+        (is_head && self.ends_an_operand() && fits(&[head]))
+            .then(|| self.unexpected().help(format!("a fold has a colon: write `{head}: {}…`", self.found)))
     }
 
     /// `fn f(x) { x^2 }`
