@@ -395,6 +395,10 @@ CLAMPED = "W0523":
 differences of pressure matter there. `shifting: 0` and `gradients: pairs` rule out the differences, and with pairs
 negative pressures are cut off at zero unless the scene says `negative_pressure: keep`. Waves of sound and flows around
 bodies come out wrong then. Stating `negative_pressure` either way silences the warning.";
+NO_FRICTION = "W0524":
+"With the paper's method walls act on the positions and velocities of particles that reach them, and have no viscous
+force on the fluid. `walls: no_slip`, or that of an obstacle, changes nothing then: oil between two plates falls freely.
+`friction` and `restitution` act where a particle hits a wall. The other methods know `no_slip`.";
 OBSTACLE_FILLS_BOX = "E0502":
 "The obstacle covers every place where fluid was to be put: nothing is left to simulate.";
 }

@@ -28,6 +28,7 @@ mod probes;
 mod rigid_parts;
 mod room;
 mod wall_speed;
+mod weight;
 
 use std::sync::Arc;
 
@@ -42,6 +43,7 @@ use crate::sph::{
     Checkpoint, Obstacle, ParameterError, Parameters, Particles, SetupError, Simulation, VectorField,
 };
 use crate::{Engine, Program, Solid};
+use weight::put_under_pressure;
 
 pub use bodies::Body;
 pub use deviation::{Deviation, Deviations};
@@ -131,6 +133,7 @@ impl Experiment {
         let warnings = clamped.into_iter().chain(too_long).chain(parameters::stirring(&scene, &parameters));
         let warnings = warnings.chain(parameters::slow_sound(&scene, &parameters));
         let warnings = warnings.chain(parameters::many_steps(&scene, &parameters));
+        let warnings = warnings.chain(parameters::without_friction(&scene, &parameters));
         let warnings = warnings.chain(drag::warnings(&scene, &parameters, &bodies));
         let warnings = warnings.chain(probes::in_bodies(&scene, &bodies, parameters.spacing())).collect();
         Ok(Self { program, scene, parameters, seen_speed, time_step, bodies, fluid, warnings })
@@ -205,7 +208,11 @@ impl Experiment {
         self.set_in_motion(&mut particles);
         let filling::Filling { carved, mass, fills_vessel, .. } = filling;
         let parameters = Parameters { particle_mass: mass, fills_vessel, ..self.parameters.clone() };
-        put_under_pressure(&parameters, &mut particles);
+        let field = match &self.scene.gravity {
+            Gravity::Field(nodes) => Some(vector_field(&self.program, nodes)),
+            Gravity::Still(_) | Gravity::Turning(_) => None,
+        };
+        put_under_pressure(&parameters, field.as_deref(), &mut particles);
         let simulation = Simulation::new(parameters, particles, self.scene.domain, obstacles);
         let mut simulation = simulation.map_err(|e| {
             let no_room = Diagnostic::error(Code::SCENE_NO_ROOM, fluid.shape_span, e.to_string());
@@ -258,20 +265,6 @@ impl Experiment {
 
     fn diagnostics(&self, list: Vec<Diagnostic>) -> Diagnostics {
         Diagnostics { list, sources: self.program.sources().clone() }
-    }
-}
-
-/// Sets the densities of a fluid at rest under its own weight, for methods that start so. The fluid's
-/// surface lies half a spacing above the highest particle.
-fn put_under_pressure(p: &Parameters, particles: &mut Particles) {
-    let up = -p.gravity.normalize_or_zero();
-    let height = |at: DVec3| up.dot(at);
-    let top = particles.position.iter().map(height).fold(f64::NEG_INFINITY, f64::max) + 0.5 * p.spacing();
-    let pressure = |at: DVec3| p.rest_density * p.gravity.length() * (top - height(at));
-    let densities: Option<Vec<f64>> =
-        particles.position.iter().map(|at| p.density_at_start(pressure(at))).collect();
-    if let Some(densities) = densities {
-        particles.density = densities;
     }
 }
 

@@ -228,6 +228,20 @@ fn time_as_written(seconds: f64) -> String {
     }
 }
 
+/// A warning if the fluid is to stick to walls that, with this method, only turn particles back.
+pub(super) fn without_friction(scene: &Scene, parameters: &Parameters) -> Option<Diagnostic> {
+    (parameters.sticks || parameters.slip == Slip::No).then_some(())?;
+    if parameters.walls_have_density() {
+        return None;
+    }
+    let method = parameters.method.name();
+    let message = format!(
+        "`no_slip` has no effect with `method: {method}`: its walls turn particles back, and rub on nothing"
+    );
+    let help = "state a `friction` of walls, with which particles that hit them lose speed, or choose another method";
+    Some(Diagnostic::warning(Code::NO_FRICTION, scene.span, message).help(help))
+}
+
 /// The part of gravity that does not depend on the place, at t = 0, m/s².
 fn at_start(program: &Program, gravity: &Gravity) -> DVec3 {
     match gravity {

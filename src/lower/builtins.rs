@@ -350,7 +350,9 @@ impl Lowering<'_> {
         let diagnostic = Diagnostic::error(Code::OUT_OF_RANGE, at, message);
         let is_negative = number < 0.0 && number.is_finite();
         if is_negative && what.starts_with("the size of a box along") {
-            return self.fail(diagnostic.help("the first corner of a box has the smaller coordinates: `box(min, max)`"));
+            return self.fail(
+                diagnostic.help("the first corner of a box has the smaller coordinates: `box(min, max)`"),
+            );
         }
         if !is_negative || what != "the thickness of a shell" {
             return self.fail(diagnostic);

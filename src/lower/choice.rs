@@ -74,7 +74,12 @@ impl Lowering<'_> {
         if let Some(holds) = self.holds(expr) {
             return Some(Condition::Known(holds));
         }
+        let before = self.diagnostics.len();
         let field = self.field(expr)?;
+        // what `<` means besides `<=` matters on the surface of a shape, and not where a choice changes
+        let is_strict = |diagnostic: &Diagnostic| diagnostic.code == Code::STRICT_COMPARISON;
+        let told = self.diagnostics.split_off(before);
+        self.diagnostics.extend(told.into_iter().filter(|diagnostic| !is_strict(diagnostic)));
         match self.known_value(field) {
             Some(value) => {
                 self.fix(field);

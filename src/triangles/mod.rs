@@ -34,7 +34,7 @@ use crate::interval::Interval;
 use crate::table::{Sample, Table};
 use nearest::Feature;
 use surface::Surface;
-use tree::Tree;
+use tree::{ROUNDED, Tree, width};
 
 pub use read::{FORMATS, is_known, read};
 pub use surface::NotClosed;
@@ -87,14 +87,18 @@ impl TriangleSolid {
         Ok(solid)
     }
 
-    /// Refuses surfaces that run through themselves: on one side of each triangle there is the solid, on the other
-    /// there is none. Asked at the centre of each triangle.
+    /// Refuses surfaces that run through themselves. No edge passes through a triangle, and on one side of each triangle
+    /// there is the solid, on the other there is none; that is asked at the centre of each triangle.
     fn is_simple(&self) -> Result<(), NotClosed> {
         let centre = |triangle: u32| {
             let [a, b, c] = self.surface.corners_of(triangle);
             (a + b + c) / 3.0
         };
         let is_wrong = |triangle: &u32| {
+            // a rounded corner may turn it over
+            if width(self.surface.corners_of(*triangle)) <= ROUNDED * self.surface.size {
+                return false;
+            }
             let Some(normal) = self.surface.normal_of(*triangle) else { return false };
             let beside = self.tree.crossings(&self.surface, centre(*triangle), Some(*triangle));
             beside.is_some_and(|beside| {
@@ -104,8 +108,17 @@ impl TriangleSolid {
         };
         let mut wrong: Vec<u32> = (0..self.surface.len() as u32).into_par_iter().filter(is_wrong).collect();
         wrong.sort_unstable();
-        match wrong.first() {
-            Some(&first) => Err(NotClosed::Overlap { count: wrong.len(), at: centre(first) }),
+        if let Some(&first) = wrong.first() {
+            return Err(NotClosed::Overlap { count: wrong.len(), at: centre(first) });
+        }
+        // the other triangle at an edge has it the other way round
+        let edges = (0..self.surface.len() as u32).into_par_iter().flat_map_iter(|triangle| {
+            let [a, b, c] = self.surface.numbers_of(triangle);
+            [[a, b], [b, c], [c, a]].into_iter().filter(|[from, to]| from < to)
+        });
+        let pierced: Vec<DVec3> = edges.filter_map(|edge| self.tree.pierced(&self.surface, edge)).collect();
+        match pierced.first() {
+            Some(&at) => Err(NotClosed::Crossing { count: pierced.len(), at }),
             None => Ok(()),
         }
     }

@@ -63,6 +63,13 @@ pub enum NotClosed {
         /// The centre of one.
         at: DVec3,
     },
+    /// Edges that pass through triangles.
+    Crossing {
+        /// How many there are.
+        count: usize,
+        /// Where one does.
+        at: DVec3,
+    },
 }
 
 impl fmt::Display for NotClosed {
@@ -112,6 +119,14 @@ impl fmt::Display for NotClosed {
                     f,
                     "its surface runs through itself: {count} triangle{} inside it, one of them at {at}",
                     if *count == 1 { " lies" } else { "s lie" }
+                )
+            }
+            Self::Crossing { count, at } => {
+                let at = place(*at);
+                write!(
+                    f,
+                    "its surface runs through itself: {count} edge{} through a triangle, one of them at {at}",
+                    if *count == 1 { " passes" } else { "s pass" }
                 )
             }
         }

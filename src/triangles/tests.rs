@@ -277,6 +277,13 @@ fn what_encloses_no_solid_is_refused() {
     let cube = prism(&[[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]], 1.0);
     let beside: Soup = [cube.clone(), moved(&cube, DVec3::new(1.0, 1.0, 0.0))].concat();
     assert!(matches!(refused(&beside), NotClosed::Branches { count: 1, .. }), "{}", refused(&beside));
+    // the centres of all triangles lie outside of the other cube
+    let long = prism(&[[0.45, 0.45], [0.55, 0.45], [0.55, 0.55], [0.45, 0.55]], 3.0);
+    let through: Soup = [cube.clone(), moved(&long, DVec3::new(0.1, 0.05, -1.0))].concat();
+    assert!(matches!(refused(&through), NotClosed::Crossing { count: 8, .. }), "{}", refused(&through));
+    // edges that meet the diagonals of faces
+    let half: Soup = [cube.clone(), moved(&cube, DVec3::splat(0.5))].concat();
+    assert!(matches!(refused(&half), NotClosed::Crossing { .. }), "{}", refused(&half));
     let flat: Soup = vec![[DVec3::ZERO, DVec3::X, DVec3::Y], [DVec3::ZERO, DVec3::Y, DVec3::X]];
     assert!(matches!(refused(&flat), NotClosed::Overlap { .. }), "{}", refused(&flat));
     assert_eq!(refused(&Soup::new()), NotClosed::Empty);

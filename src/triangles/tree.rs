@@ -27,6 +27,16 @@ const SLACK: f64 = 1.0 + 1e-12;
 /// Where a ray begins on a triangle, relative to the size of the surface.
 const TOUCHING: f64 = 1e-12;
 
+/// What files in single precision round coordinates by, some times over, relative to the size of the surface.
+pub(super) const ROUNDED: f64 = 1e-6;
+
+/// Edges that reach less far through a triangle, relative to the size of the surface, are let pass: beside a triangle
+/// that is as narrow as it is rounded, its neighbours may fold over each other by some times that.
+const SHALLOW: f64 = 2e-5;
+
+/// The least width of a triangle that edges are tested for, in terms of that.
+const NARROW: f64 = 5.0;
+
 /// No two components are in a ratio that surfaces are likely to have.
 const DIRECTIONS: [DVec3; 4] = [
     DVec3::new(0.531_742_918_3, 0.284_619_577_1, 0.797_633_205_4),
@@ -305,6 +315,48 @@ impl Tree {
     }
 }
 
+impl Tree {
+    /// Where an edge between two corners passes through a triangle that has neither of them; `None` if it passes
+    /// none. What reaches through by next to nothing does not count, nor does what its ends touch.
+    pub fn pierced(&self, surface: &Surface, edge: [u32; 2]) -> Option<DVec3> {
+        let [from, to] = edge.map(|corner| surface.place(corner));
+        let direction = (to - from).normalize_or_zero();
+        let least = SHALLOW * surface.size;
+        let space = surface.space();
+        let local = (space.local(from).as_vec3().to_array(), direction.as_vec3().to_array());
+        let view = View::new(0.5 * (from + to), space);
+        let limit = view.limit(0.25 * (to - from).length_squared());
+        let mut stack = [self.root; DEEPEST];
+        let mut height = 1;
+        while height > 0 {
+            height -= 1;
+            match stack[height].found() {
+                Found::Leaf(places) => {
+                    let is_apart = |piece: &&Piece| {
+                        !surface.numbers_of(piece.triangle).iter().any(|corner| edge.contains(corner))
+                    };
+                    for piece in self.pieces[places].iter().filter(is_apart) {
+                        if let Some(at) = passage([from, to], self.corners(piece), least) {
+                            return Some(at);
+                        }
+                    }
+                }
+                Found::Branch(i) => {
+                    let Branch { boxes, children } = &self.branches[i];
+                    let met = boxes.are_met(local).into_iter().zip(boxes.squares(&view));
+                    for ((is_met, square), &child) in met.zip(children) {
+                        if is_met && square <= limit {
+                            stack[height] = child;
+                            height += 1;
+                        }
+                    }
+                }
+            }
+        }
+        None
+    }
+}
+
 /// Two groups of equally many triangles, side by side along the axis on which their centres are farthest apart.
 fn halves((first, members): Group<'_>) -> (Group<'_>, Group<'_>) {
     let size = members.iter().fold(Aabb::EMPTY, |all, m| all.including(m.centre)).size();
@@ -315,6 +367,34 @@ fn halves((first, members): Group<'_>) -> (Group<'_>, Group<'_>) {
     });
     let (low, high) = members.split_at_mut(middle);
     ((first, low), (first + middle, high))
+}
+
+/// The least height of a triangle.
+pub(super) fn width([a, b, c]: [DVec3; 3]) -> f64 {
+    let longest = [b - a, c - b, a - c].into_iter().fold(0.0, |most, side| f64::max(most, side.length()));
+    if longest > 0.0 { (b - a).cross(c - a).length() / longest } else { 0.0 }
+}
+
+/// Where a stretch passes through a triangle, edges included, with both ends farther from its plane than `least`.
+/// `None` also for triangles that are narrower than [`NARROW`] times that: what passes through those overlaps by no more.
+fn passage([from, to]: [DVec3; 2], corners: [DVec3; 3], least: f64) -> Option<DVec3> {
+    let width = width(corners);
+    if width <= NARROW * least {
+        return None;
+    }
+    let sides = [0, 1, 2].map(|k| corners[(k + 1) % 3] - corners[k]);
+    let normal = sides[0].cross(sides[1]);
+    let [first, second] = [from, to].map(|end| {
+        let (way, above) = (end - corners[0], (end - corners[0]).dot(normal) / normal.length());
+        // a rounded corner turns a narrow triangle
+        if above.abs() > least * (1.0 + way.length() / width) { above } else { 0.0 }
+    });
+    if first * second >= 0.0 {
+        return None;
+    }
+    let at = from + first / (first - second) * (to - from);
+    let is_within = |k: usize| sides[k].cross(at - corners[k]).dot(normal) >= 0.0;
+    (0..3).all(is_within).then_some(at)
 }
 
 /// Where a line passes a triangle: 1 if it leaves the solid there and −1 if it enters it, and how far along.

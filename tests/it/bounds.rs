@@ -106,6 +106,29 @@ fn twisted_outlines_with_notches_have_ends() {
     check(&format!("{star}.extrude(-0.1, 0.1).twist(0.7)"), [-1.0, -1.0, -0.1], [1.0, 1.0, 0.1], 1e-3);
 }
 
+/// At the times 0 and 0.5 the angle of a rod lies on the cut of atan2, up to what sines are rounded by: its range would
+/// be all directions.
+#[test]
+fn a_linkage_ends_at_every_instant() {
+    let text = "rfm 1
+let a = [cos(2*pi*t), sin(2*pi*t), 0]
+let turned = atan2(a.y, a.x - 3.5)
+solid rod = box([0, -0.1, 0], [3, 0.1, 0.2]).rotate_z(turned).move([3.5, 0, 0])";
+    let program = Program::from_source("rod.rfm", text).unwrap();
+    let rod = program.solid_with("rod", Engine::Auto).unwrap();
+    for time in [0.0, 0.25, 0.5, 0.75, 1.0] {
+        let Bounds::Within(found) = *rod.at(time).bounds() else { panic!("{time}: no bounds") };
+        let turned =
+            f64::atan2((std::f64::consts::TAU * time).sin(), (std::f64::consts::TAU * time).cos() - 3.5);
+        let corners = [[0.0, -0.1], [3.0, -0.1], [3.0, 0.1], [0.0, 0.1]].map(|[x, y]| {
+            DVec3::new(3.5 + x * turned.cos() - y * turned.sin(), x * turned.sin() + y * turned.cos(), 0.0)
+        });
+        let truth = corners.iter().fold(Aabb::EMPTY, |all, p| all.including(*p));
+        let off = (found.min - truth.min).truncate().abs().max((found.max - truth.max).truncate().abs());
+        assert!(off.max_element() < 0.01, "{time}: {found:?} for {truth:?}");
+    }
+}
+
 #[test]
 fn curves_and_blends_have_their_own_extent() {
     // a trefoil knot as the torus of two strands of radius 0.2 around 2 + cos 1.5θ, sin 1.5θ

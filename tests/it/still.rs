@@ -39,6 +39,42 @@ fn a_deep_column_stands_from_the_first_step() {
     assert!(speed < 0.3 && (0.98..1.0).contains(&top), "{speed} m/s, {top} m");
 }
 
+/// Water under its own weight starts with the same densities however its gravity is written, and in a vessel that turns
+/// with those of p = ρ(½ω²r² − gz) below its highest place.
+#[test]
+fn a_weight_that_depends_on_the_place_presses_from_the_start() {
+    let start = |gravity: &str| {
+        simulation(&format!(
+            "rfm 1
+scene pool {{
+  box {{ min: [-0.2, -0.2, 0], max: [0.2, 0.2, 0.5] }}
+  fluid water {{
+    shape: box([-0.2, -0.2, 0], [0.2, 0.2, 0.3]), density: 1000, spacing: 0.05, start: hydrostatic, sound_speed: 30 m/s
+  }}
+  gravity: [{gravity}]
+  run {{ until: 0.1 s, save_every: 0.1 s }}
+}}"
+        ))
+    };
+    let (plain, field, turned) = (start("0, 0, -9.81"), start("0*x, 0, -9.81"), start("16*x, 16*y, -9.81"));
+    let density = |simulation: &Simulation, i: usize| simulation.particles().density[i];
+    // (1 + 7p/(ρc²))^(1/7) at the floor
+    let deepest = (1.0_f64 + 7.0 * 9.81 * 0.275 / 900.0).powf(1.0 / 7.0);
+    let densest = plain.particles().density.iter().copied().fold(0.0, f64::max);
+    assert!((densest / 1000.0 - deepest).abs() < 1e-4, "{densest}");
+    let tait = |density: f64| 1000.0 * 900.0 / 7.0 * ((density / 1000.0).powi(7) - 1.0);
+    let potential = |p: DVec3| 8.0 * (p.x * p.x + p.y * p.y) - 9.81 * p.z;
+    let (at, count) = (&turned.particles().position, turned.particles().len());
+    let lowest = (0..count).map(|i| potential(at.get(i))).fold(f64::INFINITY, f64::min);
+    let offset = tait(density(&turned, 0)) - 1000.0 * (potential(at.get(0)) - lowest);
+    for i in 0..count {
+        assert!((density(&plain, i) - density(&field, i)).abs() < 1e-9, "{i}");
+        let known = offset + 1000.0 * (potential(at.get(i)) - lowest);
+        assert!((tait(density(&turned, i)) - known).abs() < 1.0, "{i}: {known} Pa");
+    }
+    assert!((200.0..300.0).contains(&offset), "half a spacing of water: {offset} Pa");
+}
+
 /// Planes of particles under the pressure p swing with ω² = 6.82·p/(ρs²), the greatest eigenvalue of the forces
 /// on a cubic lattice with 2.2 spacings in a support radius, and a step of more than 2/ω makes them grow.
 #[test]

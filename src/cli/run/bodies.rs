@@ -12,6 +12,9 @@ use rfm::geom::{Aabb, Placement};
 use rfm::mesh::{self, Grid, Mesh, Resolution, Unwatched, dual_contouring};
 use rfm::{Experiment, Solid};
 
+/// Bodies that are smaller than this part of the box are drawn as nothing.
+const LEAST_BODY: f64 = 1e-9;
+
 /// The solids of a scene.
 pub(in crate::cli) struct Bodies {
     solids: Vec<Solid>,
@@ -133,7 +136,10 @@ impl Bodies {
     }
 
     fn grid(&self, solid: &Solid) -> Result<Grid, Failure> {
-        let bounds = solid.bounds().aabb().unwrap_or(self.domain);
+        // a body that grows from a point has no cells at its start
+        let least = LEAST_BODY * self.domain.size().max_element();
+        let bounds = solid.bounds().aabb().filter(|bounds| bounds.size().max_element() > least);
+        let bounds = bounds.unwrap_or(self.domain);
         let grid = Grid::within(&bounds, &self.domain, Resolution::Cells(self.cells));
         grid.map_err(|error| no_grid(&error, "--mesh-cells", self.cells))
     }

@@ -195,7 +195,9 @@ pub(super) fn print(summary: &Summary, frames: &Frames, probes: &Probes) {
                 } else {
                     ""
                 };
-                format!("never more than {excess:.2e} of it above what gravity gave{surface}")
+                format!(
+                    "never more than {excess:.2e} of the greatest energy above what gravity gave{surface}"
+                )
             }
             (None, _, Some(why)) => format!("not judged: {why}"),
             (None, _, None) => "not judged".to_string(),

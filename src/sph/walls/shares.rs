@@ -94,6 +94,8 @@ struct Near {
     sticks: bool,
     /// Its friction, were it alone.
     friction: WallDrag,
+    /// Its faces, with those in which it ends behind them; none for the box.
+    faces: Faces,
 }
 
 /// A face of a wall near a particle.
@@ -303,7 +305,7 @@ impl Boundary {
 
     /// The faces of a wall near a particle.
     fn faces_of(&self, wall: &Wall, p: DVec3, near: &Near) -> SmallVec<[Face; 6]> {
-        let Some(k) = near.obstacle else {
+        if near.obstacle.is_none() {
             let [to_low, to_high] = [p - self.domain.min, self.domain.max - p];
             let axes = DVec3::AXES.into_iter();
             let faces = axes.flat_map(|n| [(n, to_low.dot(n)), (-n, to_high.dot(n))]);
@@ -312,8 +314,7 @@ impl Boundary {
                 .map(|(normal, distance)| Face { distance, normal, mean_curvature: 0.0 })
                 .collect();
         };
-        let parts = self.faces_before(wall, p, k);
-        let faces = parts.iter().filter_map(|part| match part {
+        let faces = near.faces.iter().filter_map(|part| match part {
             Part::Face(face) => Some(*face),
             Part::All(_) | Part::Any(_) => None,
         });
@@ -322,20 +323,20 @@ impl Boundary {
 
     /// The walls within reach of a particle that at least one wall is near.
     fn near(&self, wall: &Wall, p: DVec3) -> SmallVec<[Near; 4]> {
-        let near = |obstacle: Option<usize>, coverage: &Coverage<WallDrag>| {
+        let near = |obstacle: Option<usize>, coverage: &Coverage<WallDrag>, faces: Faces| {
             let slip = obstacle.map_or(self.slip, |k| self.obstacles[k].slip);
             let Coverage { part, friction, .. } = *coverage;
             let Seen { gradient, moment } = Seen::of(&coverage.without_friction());
-            Near { obstacle, part, gradient, moment, sticks: slip == Slip::No, friction }
+            Near { obstacle, part, gradient, moment, sticks: slip == Slip::No, friction, faces }
         };
         let mut found: SmallVec<[Near; 4]> = SmallVec::new();
         // walls behind obstacles are found by their faces below
         let of_box = self.of_whole_box::<WallDrag, ()>(wall, p);
         if of_box.part > 0.0 {
-            found.push(near(None, &of_box));
+            found.push(near(None, &of_box, Faces::new()));
         }
         if found.is_empty() && self.obstacles.len() == 1 {
-            found.push(near(Some(0), &Coverage::default()));
+            found.push(near(Some(0), &Coverage::default(), Faces::new()));
             return found;
         }
         let place = Aabb::new(p, p);
@@ -343,10 +344,10 @@ impl Boundary {
             if self.field(k).is_far(&place, wall.h) {
                 continue;
             }
-            let coverage =
-                Coverage::<WallDrag>::default().or(&self.of_faces(wall, p, self.faces_before(wall, p, k), k));
+            let faces = self.faces_before(wall, p, k);
+            let coverage = Coverage::<WallDrag>::default().or(&self.of_faces(wall, p, faces.clone(), k));
             if coverage.part > 0.0 {
-                found.push(near(Some(k), &coverage));
+                found.push(near(Some(k), &coverage, faces));
             }
         }
         found
@@ -376,13 +377,13 @@ impl Boundary {
         if front.distance < -BEHIND * wall.h || front.distance >= wall.h {
             return None;
         }
-        let field = self.field(k);
         let beyond = p - (front.distance + wall.h) * front.normal;
-        if field.omega(beyond) >= 0.0 {
+        let mut there = Faces::new();
+        self.field(k).faces(beyond, wall.h, &mut there);
+        // to ask for ω would take longer where a solid has hundreds of parts
+        if there.iter().any(|part| matches!(part, Part::Face(face) if face.distance < 0.0)) {
             return None;
         }
-        let mut there = Faces::new();
-        field.faces(beyond, wall.h, &mut there);
         let backs = there.iter().filter_map(|part| match part {
             Part::Face(back) => {
                 let looks_back = front.normal.dot(back.normal) < PARALLEL - 1.0;

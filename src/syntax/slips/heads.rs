@@ -44,8 +44,9 @@ impl Slip<'_> {
         let operand = self.after().lines().next()?;
         let operand = operand.split_inclusive(')').next().unwrap_or(operand).trim();
         let operand = if fits(&[operand]) && !operand.contains(',') { operand } else { "a" };
-        (!self.ends_an_operand())
-            .then(|| self.unexpected().help(format!("what is not in a shape is `not {operand}`, or `!{operand}`")))
+        (!self.ends_an_operand()).then(|| {
+            self.unexpected().help(format!("what is not in a shape is `not {operand}`, or `!{operand}`"))
+        })
     }
 
     /// `any i = 0..6: …`
@@ -58,7 +59,8 @@ impl Slip<'_> {
         let is_range = range.contains("..") || range.starts_with('[');
         (FOLDS.contains(&fold) && !variable.is_empty() && is_range).then(|| {
             let range = if fits(&[range]) && range.contains("..") { range } else { "0..6" };
-            self.unexpected().help(format!("a fold runs over a range: write `{fold} {variable} in {range}: …`"))
+            self.unexpected()
+                .help(format!("a fold runs over a range: write `{fold} {variable} in {range}: …`"))
         })
     }
 
