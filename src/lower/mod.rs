@@ -171,13 +171,13 @@ fn lower_here(
     }
     lowering.file_name = name.into();
     lowering.files = options.files.clone();
+    let needed = options.open.as_ref().and_then(|open| needed::names((ast, imported), open.solids.as_ref()?));
+    let is_needed = |item: &&Item| needed.as_ref().is_none_or(|needed| needed.contains(&item.name().text));
     for file in imported {
-        lowering.imported_file(file, options);
+        lowering.imported_file(file, options, is_needed);
     }
     lowering.scope.source = SourceId::File;
     lowering.announce(ast);
-    let needed = options.open.as_ref().and_then(|open| needed::names(ast, open.solids.as_ref()?));
-    let is_needed = |item: &&Item| needed.as_ref().is_none_or(|needed| needed.contains(&item.name().text));
     for item in ast.items.iter().filter(is_needed) {
         lowering.item(item, options);
     }
@@ -200,13 +200,13 @@ impl<'a> Lowering<'a> {
     }
 
     /// Reads the items of an imported file. Its scenes are its own, and so are its solids: they have names there alone.
-    fn imported_file(&mut self, file: &'a Imported, options: &Options) {
+    fn imported_file(&mut self, file: &'a Imported, options: &Options, is_needed: impl Fn(&&Item) -> bool) {
         self.scope.source = file.source.id;
         self.qualifier = format!("{}.", file.qualified);
         self.announce(&file.ast);
         self.imported.push((file.source.name.clone(), file.source.id));
         let solids = self.module.solids.len();
-        for item in file.ast.items.iter().filter(|item| !matches!(item, Item::Scene(_))) {
+        for item in file.ast.items.iter().filter(|item| !matches!(item, Item::Scene(_)) && is_needed(item)) {
             self.item(item, options);
         }
         self.module.solids.truncate(solids);
@@ -268,14 +268,15 @@ impl<'a> Lowering<'a> {
         self.remember_units(&param.name, &param.value);
         let qualified = format!("{}{}", self.qualifier, param.name.text);
         let overridden = options.overrides.get(&qualified).copied();
-        let Some(value) = overridden.or(value) else {
+        let stated = value;
+        let Some(value) = overridden.or(stated) else {
             self.names.define(self.scope.source, &param.name, Kind::Value(Value::Failed));
             return;
         };
         let unit = unit_of(&param.value).map(|(unit, text)| (unit, text.to_string()));
         let given =
             ParamValue { name: qualified, value, range, unit, doc: param.doc.clone(), span: param.name.span };
-        let fits = (overridden.is_none() || self.override_fits(&given, options))
+        let fits = (overridden.is_none() || self.override_fits((&given, stated), options))
             && self.param_fits(param, &given, overridden.map(|_| options));
         let is_open = options.open.as_ref().is_some_and(|open| !open.fixed.contains(&given.name));
         let value_now = match (fits, is_open) {
@@ -307,7 +308,8 @@ impl<'a> Lowering<'a> {
 
     /// Whether the unit of an override fits the one in which the file writes the param. If not, this is reported; a
     /// number without a unit is accepted with a warning.
-    fn override_fits(&mut self, param: &ParamValue, options: &Options) -> bool {
+    /// `stated` is the value in the file.
+    fn override_fits(&mut self, (param, stated): (&ParamValue, Option<f64>), options: &Options) -> bool {
         let Some((unit, text)) = &param.unit else { return true };
         let name = &param.name;
         let Some(dimension) = options.dimensions.get(name) else {
@@ -338,7 +340,7 @@ impl<'a> Lowering<'a> {
         self.report(
             Diagnostic::error(Code::OVERRIDE, param.span, message)
                 .at("declared here")
-                .help(options.setting(name, &in_unit(unit.factor, *unit, text))),
+                .help(options.setting(name, &in_unit(stated.unwrap_or(unit.factor), *unit, text))),
         );
         false
     }

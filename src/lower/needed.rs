@@ -2,18 +2,24 @@
 
 use std::collections::BTreeSet;
 
+use super::imports::Imported;
 use crate::syntax::ast::{Ast, Expr, ExprKind, Item};
 
-/// The names that some solids mention, and those that the items of these names mention. `None` if one of the solids is
-/// no item of the file.
-pub(super) fn names(ast: &Ast, solids: &BTreeSet<String>) -> Option<BTreeSet<String>> {
+/// The names that some solids mention, and those that the items of these names mention, also in the files that are
+/// imported, each after those that it imports itself. A name of one file stands for those of all others, too: a few
+/// items more are read then. `None` if one of the solids is no item of the file.
+pub(super) fn names(
+    (ast, imported): (&Ast, &[Imported]),
+    solids: &BTreeSet<String>,
+) -> Option<BTreeSet<String>> {
     let is_item = |name: &&String| ast.items.iter().any(|item| item.name().text == **name);
     if !solids.iter().all(|name| is_item(&name)) {
         return None;
     }
     let mut needed = solids.clone();
-    // a name is defined above its uses
-    for item in ast.items.iter().rev() {
+    let imported = imported.iter().rev().map(|file| &file.ast);
+    // a name is defined above its uses, and in another file before them
+    for item in [ast].into_iter().chain(imported).flat_map(|ast| ast.items.iter().rev()) {
         // all params have values, and an import may have params
         if matches!(item, Item::Param(_) | Item::Import(_)) {
             needed.insert(item.name().text.clone());
@@ -50,6 +56,8 @@ fn add(expr: &Expr, needed: &mut BTreeSet<String>) {
     let name = match &expr.kind {
         ExprKind::Name(name) => Some(name),
         ExprKind::Call { function: name, .. } | ExprKind::Method { method: name, .. } => Some(&name.text),
+        // `lib.post`
+        ExprKind::Member { name, .. } => Some(&name.text),
         _ => None,
     };
     needed.extend(name.cloned());

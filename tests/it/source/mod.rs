@@ -10,6 +10,7 @@ use std::time::Instant;
 use proptest::strategy::{Strategy, ValueTree};
 use proptest::test_runner::{Config, RngAlgorithm, TestRng, TestRunner};
 use rfm::codegen::Form;
+use rfm::files::Files;
 use rfm::precision::Precision;
 use rfm::source::{self, Math, Options, Param, Target};
 use rfm::{Engine, Program, Solid};
@@ -303,6 +304,20 @@ fn a_header_is_c_and_cplusplus_and_cuda_is_cplusplus() {
             compile("g++", workshop.path(), &[&warnings[..], &["-std=c++11", file]].concat());
         }
     }
+}
+
+#[test]
+fn only_what_a_solid_takes_from_another_file_decides_which_params_are_constants() {
+    let parts = "rfm 1\nparam r = 1\nparam n = 3\nfn ring(k) = any i in 0..k: sphere(r).move([i, 0, 0])\n\
+                 solid post = sphere(r)\nsolid row = ring(n)\n";
+    let text = "rfm 1\nimport \"parts.rfm\" as parts\nsolid plain = parts.post\nsolid long = parts.row\n\
+                solid own = parts.ring(parts.n)\n";
+    let files = Files::from_memory([("parts.rfm", parts)]);
+    let program = Program::from_source_with("s.rfm", text, files).unwrap_or_else(|e| panic!("{e}"));
+    let fixed = |solid| program.with_open_params_of([solid]).unwrap().1;
+    assert!(fixed("plain").is_empty(), "{:?}", fixed("plain"));
+    assert_eq!(fixed("long"), ["parts.n"]);
+    assert_eq!(fixed("own"), ["parts.n"]);
 }
 
 /// ω and signs to the bit. The sums of a gradient have another order where params are no constants, and at creases any
