@@ -28,10 +28,28 @@ impl Series {
         !self.values.iter().any(|v| v.is_finite())
     }
 
+    /// The largest of its values, without sign.
+    fn size(&self) -> f64 {
+        self.values.iter().fold(0.0, |most, v| f64::max(most, v.abs()))
+    }
+
     /// Whether it has values, and all of them are zero.
     fn is_zero(&self) -> bool {
-        !self.is_empty() && self.values.iter().all(|v| *v == 0.0 || v.is_nan())
+        !self.is_empty() && self.size() == 0.0
     }
+}
+
+/// Values below this part of the largest are what rounding has left of a sum that cancels, as a force across a plane of
+/// symmetry.
+const ROUNDING: f64 = 1e-7;
+
+/// Whether the values of a column are nothing but rounding, beside the others of its unit. Torques are the forces times
+/// their arms, so the force counts for them too: one of 1e-7 of it has an arm of 0.1 µm.
+fn is_rounding(probe: &Probe, own: &Series, all: &[Series]) -> bool {
+    let by_force = matches!(probe, Probe::Force { .. });
+    let beside = all.iter().filter(|other| by_force || other.unit == own.unit);
+    let largest = beside.map(Series::size).filter(|size| size.is_finite()).fold(0.0, f64::max);
+    !own.is_empty() && own.size() < ROUNDING * largest
 }
 
 /// A plot with a line for each column over time, and with its mean, within its standard error, where one is asked
@@ -48,7 +66,7 @@ pub(super) fn drawn(name: &str, probe: &Probe, table: &str, means: Option<&Means
         plot::sentence(&mut out, &format!("zero at all times: {}", what.join(", ")));
         return out;
     }
-    let shown = |s: &&Series| !s.is_zero() && !s.is_empty();
+    let shown = |s: &&Series| !s.is_zero() && !s.is_empty() && !is_rounding(probe, s, &series);
     let mut units: Vec<&str> = Vec::new();
     for s in series.iter().filter(shown) {
         if !units.contains(&s.unit) {
@@ -104,7 +122,11 @@ pub(super) fn drawn(name: &str, probe: &Probe, table: &str, means: Option<&Means
         legend.remark(&mut out, "dashed: axis on the right");
     }
     for s in series.iter().filter(|s| !shown(s)) {
-        let what = if s.is_zero() { "zero at all times" } else { "no values" };
+        let what = match (s.is_zero(), s.is_empty()) {
+            (true, _) => "zero at all times",
+            (_, true) => "no values",
+            _ => "zero but for rounding",
+        };
         legend.remark(&mut out, &format!("{}: {what}", s.name));
     }
     out
@@ -256,6 +278,22 @@ mod tests {
         {
             assert!(svg.contains(says), "{says}: {svg}");
         }
+    }
+
+    #[test]
+    fn what_rounding_leaves_of_a_component_fills_no_axis() {
+        let probe = Probe::Force { obstacle: 0, about: glam::DVec3::ZERO };
+        let svg = drawn(
+            "f",
+            &probe,
+            "time\n0,2e3,1e-5,-900,1e-6,-2e-5,3e-6\n1,1e3,-2e-5,-800,2e-6,1e-5,1e-6\n",
+            None,
+        );
+        assert_eq!(paths(&svg).len(), 2, "{svg}");
+        assert!(!svg.contains(">torque, N·m<") && svg.contains("force y: zero but for rounding"), "{svg}");
+        // small forces beside small ones are shown, and so is a torque of a short arm
+        let svg = drawn("f", &probe, "time\n0,2e-6,1e-7,0,1e-11,0,0\n1,1e-6,2e-7,0,2e-11,0,0\n", None);
+        assert_eq!(paths(&svg).len(), 3, "{svg}");
     }
 
     #[test]
