@@ -161,15 +161,20 @@ impl Drop for Background {
     }
 }
 
+/// The solids of a text that were compiled, by their names; `None` for those that cannot be, and those that are too
+/// large.
+type Compiled = HashMap<String, Option<Solid>>;
+
 /// Looks for warnings about the formulas of a text, then for those that measuring its solids gives. Each time that some
 /// are found, all messages of the text are sent.
 fn look(shared: &Shared, text: &Text, mut document: Document, send: impl Fn(PublishDiagnosticsParams)) {
+    let mut compiled = Compiled::new();
     for search in [by_formulas, by_measuring] {
         let Some(program) = &document.program else { return };
         if !shared.is_newest(text) {
             return;
         }
-        let found = search(shared, text, program);
+        let found = search((shared, text), program, &mut compiled);
         if !found.is_empty() {
             document.messages.list.extend(found);
             send(messages::published(&text.uri, &document));
@@ -177,22 +182,39 @@ fn look(shared: &Shared, text: &Text, mut document: Document, send: impl Fn(Publ
     }
 }
 
-/// Each solid of a program that is small enough, by its name in the file. Why one cannot be compiled is among the
-/// messages of the text.
-fn solids(program: &Program) -> impl Iterator<Item = (&NamedSolid, Solid)> {
+/// Each solid of a program that is small enough, by its name in the file; each is compiled once. Why one cannot be
+/// compiled is among the messages of the text.
+fn solids<'p>(
+    program: &'p Program,
+    compiled: &mut Compiled,
+) -> impl Iterator<Item = (&'p NamedSolid, Solid)> {
+    solids_by(program, compiled, |name| program.solid_with(name, Engine::Auto).ok())
+}
+
+/// What [`solids`] gives, with a function that compiles.
+fn solids_by<'p>(
+    program: &'p Program,
+    compiled: &mut Compiled,
+    compile: impl Fn(&str) -> Option<Solid>,
+) -> impl Iterator<Item = (&'p NamedSolid, Solid)> {
     let is_small = |solid: &Solid| solid.graph(ProgramKind::Value).0.len() <= MOST_OPERATIONS;
     program.module().solids.iter().filter_map(move |named| {
-        let solid = program.solid_with(&named.name, Engine::Auto).ok().filter(is_small)?;
-        Some((named, solid))
+        let known = compiled.entry(named.name.clone());
+        let solid = known.or_insert_with(|| compile(&named.name).filter(is_small));
+        Some((named, solid.clone()?))
     })
 }
 
 /// What formulas show. If the text is no longer the newest, that is nothing.
-fn by_formulas(shared: &Shared, text: &Text, program: &Program) -> Vec<Diagnostic> {
+fn by_formulas(
+    (shared, text): (&Shared, &Text),
+    program: &Program,
+    compiled: &mut Compiled,
+) -> Vec<Diagnostic> {
     let started = Instant::now();
     let mut searches = lints::Searches::short();
     let mut found: Vec<Diagnostic> = Vec::new();
-    for (named, solid) in solids(program) {
+    for (named, solid) in solids(program, compiled) {
         if !shared.is_newest(text) {
             return Vec::new();
         }
@@ -209,9 +231,13 @@ fn by_formulas(shared: &Shared, text: &Text, program: &Program) -> Vec<Diagnosti
 }
 
 /// What `rfm check` says after it has measured the solids, as far as there is time.
-fn by_measuring(shared: &Shared, text: &Text, program: &Program) -> Vec<Diagnostic> {
+fn by_measuring(
+    (shared, text): (&Shared, &Text),
+    program: &Program,
+    compiled: &mut Compiled,
+) -> Vec<Diagnostic> {
     let watch = WhileNewest { shared, text, deadline: Deadline::after(MEASURING) };
-    let all = solids(program).take_while(|_| !watch.is_over());
+    let all = solids(program, compiled).take_while(|_| !watch.is_over());
     // what cannot be measured at all is left to `rfm check`, too
     all.flat_map(|(named, solid)| remarks(program, named, &solid, &watch).unwrap_or_default()).collect()
 }
@@ -226,5 +252,28 @@ struct WhileNewest<'a> {
 impl Watch for WhileNewest<'_> {
     fn is_over(&self) -> bool {
         self.deadline.is_over() || !self.shared.is_newest(self.text)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::cell::Cell;
+
+    use super::*;
+
+    #[test]
+    fn the_searches_of_a_text_compile_a_solid_once() {
+        let source = "rfm 1\nsolid a = sphere(1)\nsolid b = sphere(2)\n";
+        let program = Program::from_source("two.rfm", source).unwrap();
+        let (mut compiled, calls) = (Compiled::new(), Cell::new(0));
+        let compile = |name: &str| {
+            calls.set(calls.get() + 1);
+            program.solid_with(name, Engine::Interpreter).ok()
+        };
+        for _ in 0..2 {
+            let found = solids_by(&program, &mut compiled, compile);
+            assert_eq!(found.map(|(named, _)| &*named.name).collect::<Vec<_>>(), ["a", "b"]);
+        }
+        assert_eq!(calls.get(), 2);
     }
 }
