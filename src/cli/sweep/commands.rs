@@ -24,17 +24,19 @@ fn task<'a>(
     Task { shared, command, file, sweeps: &sweep.sweep, folder, options, resume, force }
 }
 
-/// The path within a folder that was asked for, whose folders are made. A path that leads elsewhere keeps only its name.
+/// The path that was asked for within the folder of a combination; folders that it needs are made. A path that leads
+/// elsewhere is followed, and its file stands there in a folder with the name of the combination.
 fn made_within(folder: &Path, asked: Option<&PathBuf>) -> Option<PathBuf> {
     let is_below = |part: Component<'_>| matches!(part, Component::Normal(_) | Component::CurDir);
-    asked.map(|path| match path.components().all(is_below) {
-        true => {
-            let path = folder.join(path);
-            // if there can be no such folder, the message about the file says why
-            let _ = path.parent().map(std::fs::create_dir_all);
-            path
-        }
-        false => folder.join(path.file_name().unwrap_or_default()),
+    asked.map(|path| {
+        let path =
+            match (path.components().all(is_below), path.parent(), path.file_name(), folder.file_name()) {
+                (false, Some(parent), Some(file), Some(combination)) => parent.join(combination).join(file),
+                _ => folder.join(path),
+            };
+        // if there can be no such folder, the message about the file says why
+        let _ = path.parent().map(std::fs::create_dir_all);
+        path
     })
 }
 
