@@ -23,6 +23,8 @@ pub struct Volume {
     pub area: f64,
     /// An estimate of the error of the area, m².
     pub area_error: f64,
+    /// The box of the finer mesh.
+    pub extent: Aabb,
     /// The number of separate solids in the finer mesh.
     pub solids: usize,
     /// The number of separate solids in the coarser mesh. If the two numbers differ, neither is certain.
@@ -54,7 +56,9 @@ impl std::fmt::Display for VolumeError {
             }
             Self::Grid(error) => error.fmt(f),
             Self::Mesh(error) => error.fmt(f),
-            Self::TooThin => write!(f, "the solid is too thin for this many cells along its longest side"),
+            Self::TooThin => {
+                write!(f, "the solid is empty, or too thin for this many cells along its longest side")
+            }
         }
     }
 }
@@ -93,6 +97,7 @@ pub fn volume(
         error: spread(volumes, false).max(fine.cubic.error()),
         area,
         area_error: area_spread.max(fine.added_area.error()),
+        extent: fine.extent,
         solids: fine.solids,
         solids_coarser: coarse.solids,
     })
@@ -125,6 +130,8 @@ fn limit(areas: [f64; 3]) -> (f64, f64) {
 struct Measured {
     volume: f64,
     area: f64,
+    /// The box of its vertices.
+    extent: Aabb,
     /// The number of separate solids.
     solids: usize,
     /// What the surface has more of area than the triangles.
@@ -188,11 +195,13 @@ impl Measured {
         let (quadratic, cubic, added_area) = parts
             .into_iter()
             .fold(none, |all, part| (all.0 + part.0, all.1.join(part.1), all.2.join(part.2)));
+        let nothing = Aabb::new(DVec3::INFINITY, DVec3::NEG_INFINITY);
         let shells = shells(mesh);
         let [volume, area] = shells.iter().fold([0.0; 2], |[v, a], shell| [v + shell.volume, a + shell.area]);
         Self {
             volume: volume + quadratic + cubic.sum,
             area: area + added_area.sum,
+            extent: mesh.positions.iter().fold(nothing, |all, p| Aabb::new(all.min.min(*p), all.max.max(*p))),
             solids: shells.iter().filter(|shell| shell.is_solid()).count(),
             added_area,
             cubic,

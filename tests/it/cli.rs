@@ -242,6 +242,42 @@ fn check_as_json() {
     assert!(message["message"].as_str().unwrap().contains("spere"));
 }
 
+#[test]
+fn a_budget_below_a_second_is_compared_as_it_is_and_a_missing_volume_is_explained() {
+    let ball = "rfm 1\nsolid s = sphere(1)\n".as_bytes();
+    let check =
+        |budget: &str| rfm_reading(root(), &["check", "--json", "--budget", budget, "-"], ball).expect(0);
+    // a few operations take a few milliseconds
+    let enough = check("20ms");
+    assert!(!enough.stderr.contains("measuring it may take"), "{}", enough.stderr);
+    let little = check("1e-6");
+    assert!(little.stderr.contains("measuring it may take 0.0"), "{}", little.stderr);
+    let why = little.json()["solids"][0]["no_volume"].as_str().unwrap().to_string();
+    assert!(why.contains("--budget 0.0"), "{why}");
+    let thread = "rfm 1\nsolid s = box([0, 0, 0], [10, 0.001, 0.001])\n".as_bytes();
+    let solid = rfm_reading(root(), &["check", "--json", "-"], thread).expect(0).json()["solids"][0].clone();
+    assert!(
+        solid["volume"].is_null() && solid["no_volume"].as_str().unwrap().contains("too thin"),
+        "{solid}"
+    );
+}
+
+/// Plates along the grid, of which its usual cells or the coarser ones show nothing. What is stated as an error must hold.
+#[test]
+fn plates_between_the_nodes_are_measured_with_the_cells_that_they_need() {
+    for thickness in [0.02, 0.025, 0.04] {
+        let text = format!("rfm 1\nsolid s = box([0, 0, 0], [5, {thickness}, 1])\n");
+        let outcome =
+            rfm_reading(root(), &["check", "--json", "--budget", "60", "-"], text.as_bytes()).expect(0);
+        let solid = outcome.json()["solids"][0].clone();
+        let figure = |name: &str| solid[name].as_f64().unwrap_or_else(|| panic!("{name} of {solid}"));
+        assert_eq!((&solid["resolved"], figure("components")), (&true.into(), 1.0), "{solid}");
+        assert!((figure("volume") - 5.0 * thickness).abs() <= figure("volume_error") + 1e-12, "{solid}");
+        assert!((figure("area") - 10.0 - 12.0 * thickness).abs() <= figure("area_error") + 1e-9, "{solid}");
+        assert!(solid["no_volume"].is_null());
+    }
+}
+
 /// A solid with walls of one and a half cells is measured with the cells that it needs, and a slow solid leaves the
 /// others their share of the time.
 #[test]

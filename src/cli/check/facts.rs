@@ -55,8 +55,11 @@ pub(super) struct Facts {
     #[serde(skip)]
     pub wants_time: bool,
     /// Why there is no volume although there are bounds.
-    #[serde(skip)]
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub no_volume: Option<String>,
+    /// Whether the bounds reach farther than the mesh by more than its cells may hide.
+    #[serde(skip)]
+    pub are_loose: bool,
     /// Whether nothing of the solid was found: the finer grid has no surface, and no part hides between its nodes.
     #[serde(skip)]
     pub shows_nothing: bool,
@@ -85,6 +88,7 @@ impl Facts {
             components_coarser: None,
             wants_time: false,
             no_volume: None,
+            are_loose: false,
             shows_nothing: false,
         }
     }
@@ -141,7 +145,8 @@ fn print_solid(solid: &Facts) {
     }
     if let Some(bounds) = &solid.bounds {
         let [min, max] = corners(bounds);
-        say!("    bounds      {min} … {max}");
+        let at_most = if solid.are_loose { "at most " } else { "" };
+        say!("    bounds      {at_most}{min} … {max}");
         if let Some(why) = &solid.no_volume {
             say!("    volume      not found: {why}");
         }

@@ -20,6 +20,9 @@ const MOST_UNKNOWN: usize = 50;
 const MOST_ON_FACES: f64 = 3.0 * 512.0 * 512.0;
 const REFINED: usize = 3;
 
+/// Cells by which a mesh may fall short of the bounds of its solid: tips and sharp rims are cut off.
+const HIDDEN_CELLS: f64 = 2.0;
+
 /// What rounding may add to the sums over triangles, relative to them.
 const ROUNDING: f64 = 1e-12;
 
@@ -72,8 +75,10 @@ pub(super) fn measure(
         let is_known = solids != coarser || !no_thin_parts || thin.is_some_and(|thin| !thin.ended);
         facts.resolved = is_known.then_some(solids == coarser && no_thin_parts);
     }
-    let is_missed = facts.resolved == Some(false) || by_meshes == ByMeshes::ShowNothing;
-    if let Some(thin) = thin.filter(|_| is_missed) {
+    // of a plate that lies between the nodes nothing is seen, but the search may have found it
+    let is_hidden =
+        by_meshes == ByMeshes::ShowNothing && thin.is_some_and(|thin| thin.count > 0 && !thin.ended);
+    if let Some(thin) = thin.filter(|_| facts.resolved == Some(false) || is_hidden) {
         refine((solid, &*surface, bounds), (&grid, thin), watch, (&mut facts, notes));
     }
     // a part too thin for a cell would have been found
@@ -117,7 +122,7 @@ fn by_meshes(
     facts: &mut Facts,
 ) -> Result<ByMeshes, Failure> {
     match mesh::volume(surface, bounds, VOLUME_CELLS, watch) {
-        Ok(found) => take(&found, VOLUME_CELLS, facts),
+        Ok(found) => take(&found, bounds, VOLUME_CELLS, facts),
         Err(VolumeError::TooThin) => {
             let why = format!("it is empty, or too thin for {VOLUME_CELLS} cells along its longest side");
             facts.no_volume = Some(why + &uneven_sides(bounds).unwrap_or_default());
@@ -153,8 +158,12 @@ fn uneven_sides(bounds: &Aabb) -> Option<String> {
     })
 }
 
-/// The figures of meshes, the finest of which has so many cells along the longest side.
-fn take(found: &Volume, cells: usize, facts: &mut Facts) {
+/// The figures of meshes, the finest of which has so many cells along the longest side of the solid's bounds.
+fn take(found: &Volume, bounds: &Aabb, cells: usize, facts: &mut Facts) {
+    let hidden = HIDDEN_CELLS * bounds.size().max_element() / cells as f64;
+    let excess = (found.extent.min - bounds.min).max(bounds.max - found.extent.max);
+    facts.are_loose = excess.max_element() > hidden;
+    facts.no_volume = None;
     facts.cells = Some(cells);
     facts.volume = Some(found.volume);
     facts.volume_error = Some(found.error);
@@ -202,7 +211,8 @@ fn refine(
     watch: &dyn Watch,
     (facts, notes): (&mut Facts, &mut Vec<String>),
 ) {
-    let mut needed = thin.cells_needed(grid);
+    // what hides in no cell of the usual grid may still hide in the coarser one, of half as many
+    let mut needed = if thin.count == 0 { Some(2 * VOLUME_CELLS) } else { thin.cells_needed(grid) };
     for _ in 0..REFINED {
         let can_be_had = |&cells: &usize| cells > VOLUME_CELLS && on_faces(bounds, cells) <= MOST_ON_FACES;
         let Some(cells) = needed.filter(can_be_had) else { return };
@@ -227,7 +237,7 @@ fn refine(
         }
         match mesh::volume(surface, bounds, cells, watch) {
             Ok(found) if found.solids == found.solids_coarser => {
-                take(&found, cells, facts);
+                take(&found, bounds, cells, facts);
                 facts.resolved = Some(true);
                 facts.no_volume = None;
             }
@@ -279,4 +289,32 @@ fn knows_ranges(solid: &Solid, bounds: &Aabb) -> bool {
     };
     let unknown = (0..PROBES.pow(3)).filter(|&i| probe(i)).count();
     unknown * MOST_UNKNOWN <= PROBES.pow(3) as usize
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use rfm::{Engine, Program};
+
+    #[test]
+    fn bounds_are_loose_if_the_mesh_ends_cells_before_them() {
+        let program = Program::from_source("s.rfm", "rfm 1\nsolid s = sphere(1)\n").unwrap();
+        let solid = program.solid_with("s", Engine::Interpreter).unwrap();
+        let extent = Aabb::new(DVec3::splat(-1.0), DVec3::splat(1.0));
+        let found = Volume {
+            volume: 4.2,
+            error: 0.0,
+            area: 12.6,
+            area_error: 0.0,
+            extent,
+            solids: 1,
+            solids_coarser: 1,
+        };
+        let is_loose_by = |excess: f64| {
+            let mut facts = Facts::unknown(&solid, "");
+            take(&found, &Aabb::new(extent.min, extent.max + DVec3::Y * excess), 100, &mut facts);
+            facts.are_loose
+        };
+        assert_eq!([0.0, 0.01, 0.03, 0.05, 1.0].map(is_loose_by), [false, false, false, true, true]);
+    }
 }

@@ -244,7 +244,8 @@ impl<'a> Tried<'a> {
                 notes.push(format!("solid `{}` has {operations} operations: {why}", named.name));
                 let bounds = solid.bounds().aabb().map(|bounds| Box3::of(&bounds));
                 let empty = *solid.bounds() == Bounds::Empty;
-                (Facts { bounds, empty, ..Facts::unknown(&solid, file) }, None)
+                let no_volume = bounds.as_ref().map(|_| why);
+                (Facts { bounds, empty, no_volume, ..Facts::unknown(&solid, file) }, None)
             }
             None => {
                 let (facts, thin) = measure(&solid, file, &Deadline::after(seconds), &mut notes)?;
@@ -332,14 +333,28 @@ fn is_over(measured: usize, all: usize, elapsed: f64, budget: f64) -> bool {
 fn too_long(solid: &Solid, operations: usize, budget: f64) -> Option<String> {
     // leaf by leaf the work grows with the surface rather than with the formula
     let each = if solid.leaf_count().is_some() { SECONDS_BY_LEAVES } else { SECONDS_AS_A_WHOLE };
-    let seconds = (each * operations as f64).ceil();
-    let why = || format!("measuring it may take {seconds} s; --budget {seconds} allows it");
+    let seconds = each * operations as f64;
+    let shown = upwards(seconds);
+    let why = || format!("measuring it may take {shown} s; --budget {shown} allows it");
     (seconds > budget).then(why)
+}
+
+/// A number of seconds, no smaller than it is: with two digits, and whole from ten on.
+fn upwards(seconds: f64) -> f64 {
+    // one over the unit of the last digit, which is a power of ten without an error
+    let parts = 10f64.powi((1.0 - seconds.log10().floor()).clamp(0.0, 12.0) as i32);
+    (seconds * parts).ceil() / parts
 }
 
 #[cfg(test)]
 mod tests {
-    use super::is_over;
+    use super::{is_over, upwards};
+
+    #[test]
+    fn an_estimate_is_never_shown_below_what_a_budget_must_be() {
+        let shown = [0.0041, 0.0124, 0.4, 1.21, 9.99, 12.3, 431.2].map(upwards);
+        assert_eq!(shown, [0.0041, 0.013, 0.4, 1.3, 10.0, 13.0, 432.0]);
+    }
 
     #[test]
     fn one_solid_is_measured_as_far_as_the_budget_goes_and_no_more_when_it_is_spent() {
