@@ -239,7 +239,6 @@ fn refine(
             Ok(found) if found.solids == found.solids_coarser => {
                 take(&found, bounds, cells, facts);
                 facts.resolved = Some(true);
-                facts.no_volume = None;
             }
             Err(VolumeError::Mesh(MeshError::Ended)) => {
                 facts.wants_time = true;

@@ -13,9 +13,11 @@
 //! pressure in a drop was 8 % too high at h/R = 0.385, and the square of the rate at which it swings was too large by
 //! twice that part.) Where the solver keeps the density, a surface counts as filled and bears no pressure. There the work
 //! of the tension decides, ∫ 2σκ_i·n_i·v over the layer. In a drop that swings κ_i is larger as the layer is nearer
-//! to the middle, but the layer has less area and moves less, and all of that cancels. The sums for κ are one-sided, like the fluid, so they are divided by their own
-//! tangential moment Σ V c f·½(r² − (r·n̂)²). This is exact where the normals turn evenly. (Sirotkin & Yoh
-//! 2012 renormalise the full matrix.)
+//! to the middle, but the layer has less area and moves less, and all of that cancels.
+//!
+//! The sums for κ_i are one-sided, like the fluid, so they are divided by their own tangential moment
+//! Σ V c f·½(r² − (r·n̂)²). This is exact where the normals turn evenly. (Sirotkin & Yoh 2012 renormalise the full
+//! matrix.)
 //!
 //! A surface meets a wall at a right angle: for n̂ and κ the fluid has an image in the wall ([`super::wetting`]).
 //! In n, which is what a pressure acts on as well, it is the wet part of the wall that counts. (With the whole wall, which
