@@ -262,7 +262,7 @@ fn a_budget_below_a_second_is_compared_as_it_is_and_a_missing_volume_is_explaine
     );
 }
 
-/// Plates along the grid, of which its usual cells or the coarser ones show nothing. What is stated as an error must hold.
+/// Plates along the grid, of which its usual cells or the coarser ones show nothing. The stated errors must hold.
 #[test]
 fn plates_between_the_nodes_are_measured_with_the_cells_that_they_need() {
     for thickness in [0.02, 0.025, 0.04] {
