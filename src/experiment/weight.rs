@@ -85,7 +85,7 @@ mod tests {
     fn forces_around_an_axis_have_no_potential() {
         let mut particles = Particles::default();
         for i in 0..50 {
-            particles.position.push(DVec3::new(0.02 * f64::from(i), 0.3, 0.1));
+            particles.push(DVec3::new(0.02 * f64::from(i), 0.3, 0.1), DVec3::ZERO);
         }
         let held = |p: DVec3, _: f64| DVec3::new(4.0 * p.x, 4.0 * p.y, -9.81);
         let stirred = |p: DVec3, _: f64| DVec3::new(-p.y, p.x, -1.0);

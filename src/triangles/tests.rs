@@ -278,8 +278,8 @@ fn what_encloses_no_solid_is_refused() {
     let beside: Soup = [cube.clone(), moved(&cube, DVec3::new(1.0, 1.0, 0.0))].concat();
     assert!(matches!(refused(&beside), NotClosed::Branches { count: 1, .. }), "{}", refused(&beside));
     // the centres of all triangles lie outside of the other cube
-    let long = prism(&[[0.45, 0.45], [0.55, 0.45], [0.55, 0.55], [0.45, 0.55]], 3.0);
-    let through: Soup = [cube.clone(), moved(&long, DVec3::new(0.1, 0.05, -1.0))].concat();
+    let long = prism(&[[0.45, 0.45], [0.55, 0.45], [0.55, 0.55], [0.45, 0.55]], 9.0);
+    let through: Soup = [cube.clone(), moved(&long, DVec3::new(0.1, 0.05, -4.0))].concat();
     assert!(matches!(refused(&through), NotClosed::Crossing { count: 8, .. }), "{}", refused(&through));
     // edges that meet the diagonals of faces
     let half: Soup = [cube.clone(), moved(&cube, DVec3::splat(0.5))].concat();

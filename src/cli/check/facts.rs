@@ -60,6 +60,9 @@ pub(super) struct Facts {
     /// Whether the bounds reach farther than the mesh by more than its cells may hide.
     #[serde(skip)]
     pub are_loose: bool,
+    /// What there is to ask of sides that are far longer than others.
+    #[serde(skip)]
+    pub uneven_sides: Option<String>,
     /// Whether nothing of the solid was found: the finer grid has no surface, and no part hides between its nodes.
     #[serde(skip)]
     pub shows_nothing: bool,
@@ -89,6 +92,7 @@ impl Facts {
             wants_time: false,
             no_volume: None,
             are_loose: false,
+            uneven_sides: None,
             shows_nothing: false,
         }
     }
@@ -180,7 +184,8 @@ fn print_solid(solid: &Facts) {
     }
     match solid.cells {
         Some(cells) if cells > VOLUME_CELLS => {
-            say!("    measured    with {cells} cells along its longest side")
+            let uneven = solid.uneven_sides.as_deref().unwrap_or_default();
+            say!("    measured    with {cells} cells along its longest side{uneven}")
         }
         Some(_) => {}
         None if solid.volume.is_some() && !solid.empty => {

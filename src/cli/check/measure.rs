@@ -239,6 +239,7 @@ fn refine(
             Ok(found) if found.solids == found.solids_coarser => {
                 take(&found, bounds, cells, facts);
                 facts.resolved = Some(true);
+                facts.uneven_sides = uneven_sides(bounds);
             }
             Err(VolumeError::Mesh(MeshError::Ended)) => {
                 facts.wants_time = true;

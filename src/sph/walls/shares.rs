@@ -11,7 +11,7 @@ use super::{
     layers::Wall,
     symmetric::Symmetric,
 };
-use crate::field::{Face, Faces, Part};
+use crate::field::{Face, Faces, Part, surface_face};
 use crate::geom::Aabb;
 use crate::sph::scales::Slip;
 
@@ -381,7 +381,7 @@ impl Boundary {
         let mut there = Faces::new();
         self.field(k).faces(beyond, wall.h, &mut there);
         // to ask for ω would take longer where a solid has hundreds of parts
-        if there.iter().any(|part| matches!(part, Part::Face(face) if face.distance < 0.0)) {
+        if surface_face(&there).is_none_or(|surface| surface.distance <= 0.0) {
             return None;
         }
         let backs = there.iter().filter_map(|part| match part {
