@@ -10,16 +10,18 @@ const STRETCHES: usize = 4;
 const GAUSS: [(f64, f64); 3] =
     [(0.112_701_665_379_258_3, 5.0 / 18.0), (0.5, 8.0 / 18.0), (0.887_298_334_620_741_7, 5.0 / 18.0)];
 
-/// Particles around which forces are tested for having a potential, and the part of the greatest force that may be left.
+/// Particles to which the work of forces is tested for not depending on the way, and the part of the greatest force, over
+/// the extent of the fluid, that may be left.
 const TESTED: usize = 100;
 const LEFT: f64 = 1e-3;
 
 /// Sets the densities of a fluid at rest under its own weight, for methods that start so. The fluid's surface lies half
 /// a spacing above the particle that is highest, which is where the forces do least work on the way. Forces that depend
-/// on the place and have no potential hold no fluid at rest, and change nothing here.
+/// on the place and have no potential hold no fluid at rest, and change nothing here; nor do those whose work is not
+/// found on straight ways through the middle of the fluid, as around a planet.
 pub(super) fn put_under_pressure(p: &Parameters, field: Option<&VectorField>, particles: &mut Particles) {
     let Some(middle) = middle(particles) else { return };
-    if field.is_some_and(|field| !has_potential(field, particles, p.spacing())) {
+    if field.is_some_and(|field| !has_potential(field, middle, particles)) {
         return;
     }
     let force = |at: DVec3| field.map_or(p.gravity, |field| field(at, 0.0));
@@ -55,17 +57,19 @@ fn work(field: &VectorField, from: DVec3, to: DVec3) -> f64 {
     (0..STRETCHES).map(stretch).sum()
 }
 
-/// Whether forces do no work around small squares beside some of the particles.
-fn has_potential(field: &VectorField, particles: &Particles, side: f64) -> bool {
+/// Whether the work of forces does not depend on the way: around triangles of the middle and two particles there is
+/// none.
+fn has_potential(field: &VectorField, middle: DVec3, particles: &Particles) -> bool {
     let every = particles.len().div_ceil(TESTED).max(1);
-    let around = |at: DVec3, axis: usize| {
-        let (u, v) = (side * DVec3::AXES[axis], side * DVec3::AXES[(axis + 1) % 3]);
-        let corners = [at, at + u, at + u + v, at + v, at];
-        corners.array_windows::<2>().map(|[from, to]| work(field, *from, *to)).sum::<f64>()
+    let places: Vec<DVec3> = (0..particles.len()).step_by(every).map(|i| particles.position.get(i)).collect();
+    let largest = |of: &dyn Fn(DVec3) -> f64| places.iter().map(|at| of(*at)).fold(0.0, f64::max);
+    let most = LEFT * largest(&|at| field(at, 0.0).length()) * largest(&|at| at.distance(middle));
+    // NaN closes nothing
+    let closes = |from: DVec3, to: DVec3| {
+        (work(field, middle, from) + work(field, from, to) - work(field, middle, to)).abs() <= most
     };
-    let places = || (0..particles.len()).step_by(every).map(|i| particles.position.get(i));
-    let greatest = places().map(|at| field(at, 0.0).length()).fold(0.0, f64::max);
-    places().all(|at| (0..3).all(|axis| around(at, axis).abs() <= LEFT * greatest * 4.0 * side))
+    let far = 1 + places.len() / 3;
+    (0..places.len()).all(|k| closes(places[k], places[(k + far) % places.len()]))
 }
 
 #[cfg(test)]
@@ -82,14 +86,19 @@ mod tests {
     }
 
     #[test]
-    fn forces_around_an_axis_have_no_potential() {
+    fn forces_around_an_axis_or_a_planet_have_no_potential_that_is_found() {
         let mut particles = Particles::default();
-        for i in 0..50 {
-            particles.push(DVec3::new(0.02 * f64::from(i), 0.3, 0.1), DVec3::ZERO);
+        for i in 0..200 {
+            let angle = 0.7 * f64::from(i);
+            let place = DVec3::new(angle.cos(), angle.sin(), 0.01 * f64::from(i % 17) - 0.08);
+            particles.push((1.0 + 0.002 * f64::from(i % 23)) * place, DVec3::ZERO);
         }
+        let middle = middle(&particles).unwrap();
         let held = |p: DVec3, _: f64| DVec3::new(4.0 * p.x, 4.0 * p.y, -9.81);
-        let stirred = |p: DVec3, _: f64| DVec3::new(-p.y, p.x, -1.0);
-        assert!(has_potential(&held, &particles, 0.01));
-        assert!(!has_potential(&stirred, &particles, 0.01));
+        let stirred = |p: DVec3, _: f64| DVec3::new(-0.1 * p.y, 0.1 * p.x, -9.81);
+        let planet = |p: DVec3, _: f64| -p / p.length().powi(3);
+        assert!(has_potential(&held, middle, &particles));
+        assert!(!has_potential(&stirred, middle, &particles));
+        assert!(!has_potential(&planet, middle, &particles));
     }
 }

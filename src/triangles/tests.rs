@@ -283,7 +283,8 @@ fn what_encloses_no_solid_is_refused() {
     assert!(matches!(refused(&through), NotClosed::Crossing { count: 10, .. }), "{}", refused(&through));
     // edges that meet the diagonals of faces
     let half: Soup = [cube.clone(), moved(&cube, DVec3::splat(0.5))].concat();
-    assert!(matches!(refused(&half), NotClosed::Crossing { .. }), "{}", refused(&half));
+    let half = refused(&half);
+    assert!(matches!(half, NotClosed::Crossing { .. } | NotClosed::Overlap { .. }), "{half}");
     let flat: Soup = vec![[DVec3::ZERO, DVec3::X, DVec3::Y], [DVec3::ZERO, DVec3::Y, DVec3::X]];
     assert!(matches!(refused(&flat), NotClosed::Overlap { .. }), "{}", refused(&flat));
     assert_eq!(refused(&Soup::new()), NotClosed::Empty);

@@ -7,11 +7,11 @@
 //! a_i = (2σ/ρ₀)·κ·n_i/L
 //! ```
 //!
-//! κ and L ([`Layer`]) depend on how pressures push the particles of a surface. Where the compressed fluid does it, they
-//! act in pairs, and a pressure p that is the same everywhere pushes by −2p·n_i/ρ₀. So p = σκ balances the tension, however
-//! the layer is filled, if κ is the curvature of the surface; that of the layer below it, κ_i, is larger. (With κ_i the
-//! pressure in a drop was 8 % too high at h/R = 0.385, and the square of the rate at which it swings was too large by
-//! twice that part.) Where the solver keeps the density, a surface counts as filled and bears no pressure. There the work
+//! κ and L ([`Layer`]) depend on how pressures push the particles of a surface. In a compressed fluid they act in
+//! pairs, and a pressure p that is the same everywhere pushes by −2p·n_i/ρ₀. So p = σκ balances the tension of the
+//! particles with a full normal, if κ is the curvature of the surface; that of the layer below it, κ_i, is larger.
+//! (With κ_i the pressure in a drop was 8 % too high at h/R = 0.385, and the square of the rate at which it swings was
+//! too large by twice that part.) Where the solver keeps the density, a surface counts as filled and bears no pressure. There the work
 //! of the tension decides, ∫ 2σκ_i·n_i·v over the layer. In a drop that swings κ_i is larger as the layer is nearer
 //! to the middle, but the layer has less area and moves less, and all of that cancels.
 //!
@@ -50,14 +50,17 @@ const NORMAL: [f64; 2] = [0.1, 0.3];
 /// Layers of a lattice below which no particle has a normal.
 const LAYERS: u32 = 4;
 
+/// A layer that finds less than this part of its tension has too few neighbours for that to be told from a lattice.
+const LEAST_WHOLE: f64 = 0.5;
+
 /// A neighbourhood with less than this part of a full tangential moment has no curvature.
 const LEAST_MOMENT: f64 = 0.05;
 
 /// By how much of itself, over hκ, the curvature of a layer of particles counts as too large, where pressures act in
-/// pairs. It lies nearer to the middle of a drop than the surface does: by quadrature of the sums over balls with h/R of
-/// 0.15 to 0.39 it tells 0.149 to 0.171 too much. With that the pressure of a drop at rest is within 1 %, but its swings
-/// are slow by 2 to 6 % (8000 to 1500 particles), because their work is that of the layer. With 0.11 the pressure is 4 to
-/// 3 % too high, and periods are within 1 % from 2000 particles on.
+/// pairs. The layer lies nearer to the middle of a drop than the surface does. By quadrature of the sums over balls with
+/// h/R of 0.15 to 0.39 its curvature is 0.149 to 0.171 too large. With that the pressure of a drop at rest is within 1 %,
+/// but its swings are 2 to 6 % slow (8000 to 1500 particles), because their work is that of the layer. With 0.11 the
+/// pressure is 4 to 3 % too high, and periods are within 1 % from 2000 particles on.
 const DEPTH: f64 = 0.11;
 
 /// What [`NORMAL`] leaves of ∫|n| across a flat surface.
@@ -264,7 +267,8 @@ impl Layer {
         let ratio = parameters.support_radius / parameters.spacing();
         let layers = (0..LAYERS).map(|layer| Wendland::lattice_surface(ratio, layer).normal);
         // half of ∫|n| lies within the fluid
-        Self { depth: 0.0, whole: 2.0 / ratio * layers.map(|normal| normal * weight_of(normal)).sum::<f64>() }
+        let whole = 2.0 / ratio * layers.map(|normal| normal * weight_of(normal)).sum::<f64>();
+        Self { depth: 0.0, whole: whole.max(LEAST_WHOLE) }
     }
 
     /// The curvature that counts, times h, from that of the layer, times h: the u of u·(1 + depth·u) = told.
