@@ -11,9 +11,9 @@
 //! pairs, and a pressure p that is the same everywhere pushes by −2p·n_i/ρ₀. So p = σκ balances the tension of the
 //! particles with a full normal, if κ is the curvature of the surface; that of the layer below it, κ_i, is larger.
 //! (With κ_i the pressure in a drop was 8 % too high at h/R = 0.385, and the square of the rate at which it swings was
-//! too large by twice that part.) Where the solver keeps the density, a surface counts as filled and bears no pressure. There the work
-//! of the tension decides, ∫ 2σκ_i·n_i·v over the layer. In a drop that swings κ_i is larger as the layer is nearer
-//! to the middle, but the layer has less area and moves less, and all of that cancels.
+//! too large by twice that part.) Where the solver keeps the density, a surface counts as filled and bears no pressure.
+//! There the work of the tension decides, ∫ 2σκ_i·n_i·v over the layer. In a drop that swings κ_i is larger as the
+//! layer is nearer to the middle, but the layer has less area and moves less, and all of that cancels.
 //!
 //! The sums for κ_i are one-sided, like the fluid, so they are divided by their own tangential moment
 //! Σ V c f·½(r² − (r·n̂)²). This is exact where the normals turn evenly. (Sirotkin & Yoh 2012 renormalise the full
