@@ -111,6 +111,8 @@ pub struct Graph {
     interned: FxHashMap<Expr, Node>,
     /// See [`Lookup`]. Graphs that are made of one another share them.
     tables: Tables,
+    /// See [`Graph::enclose`].
+    hulls: FxHashMap<Node, Node>,
 }
 
 impl Graph {
@@ -336,10 +338,51 @@ impl Graph {
         }
     }
 
+    /// States that a field is positive nowhere but where another one is, which has an end that is easily found: its
+    /// formula may not show where it ends. Both keep to this in other coordinates. Graphs that are taken out of this
+    /// one know nothing of it.
+    pub fn enclose(&mut self, field: Node, hull: Node) {
+        self.hulls.insert(field, hull);
+    }
+
+    /// What encloses a field.
+    pub fn hull(&self, field: Node) -> Option<Node> {
+        self.hulls.get(&field).copied()
+    }
+
+    /// The fields that some roots use and that are enclosed, with what encloses them.
+    pub fn enclosed(&self, roots: &[Node]) -> Vec<(Node, Node)> {
+        if self.hulls.is_empty() {
+            return Vec::new();
+        }
+        let used = self.reachable(roots);
+        let mut enclosed: Vec<(Node, Node)> = self
+            .hulls
+            .iter()
+            .map(|(&field, &hull)| (field, hull))
+            .filter(|(field, _)| used[field.index()])
+            .collect();
+        enclosed.sort_unstable();
+        enclosed
+    }
+
     /// The node with x, y, z replaced: the same shape in other coordinates, at the same time.
     pub fn substitute(&mut self, root: Node, coordinates: [Node; 3]) -> Node {
+        let cone = self.cone(root);
         let mut image: FxHashMap<Node, Node> = FxHashMap::default();
-        for node in self.cone(root) {
+        self.map_coordinates(&cone, coordinates, &mut image);
+        for field in cone {
+            if let Some(hull) = self.hull(field) {
+                self.map_coordinates(&self.cone(hull), coordinates, &mut image);
+                self.enclose(image[&field], image[&hull]);
+            }
+        }
+        image[&root]
+    }
+
+    /// Adds the images of nodes, operands before their uses, with x, y, z replaced.
+    fn map_coordinates(&mut self, cone: &[Node], coordinates: [Node; 3], image: &mut FxHashMap<Node, Node>) {
+        for &node in cone {
             let new = match self.expr(node) {
                 Expr::Coordinate(Axis::X) => coordinates[0],
                 Expr::Coordinate(Axis::Y) => coordinates[1],
@@ -352,7 +395,6 @@ impl Graph {
             };
             image.insert(node, new);
         }
-        image[&root]
     }
 
     /// Adds the values of nodes that are not known yet to those of the nodes before them, with these values of

@@ -88,7 +88,28 @@ impl Lowering<'_> {
         let corner = |i: usize| corners[i % count];
         let formula = whole(&corner, (second + count - first) % count, count);
         let (node, _) = self.outlined((&formula, true), &corners, span);
+        let hull = self.octagon(&corners, span);
+        self.module.graph.enclose(node, hull);
         node
+    }
+
+    /// A field that is positive inside the smallest octagon of its kind around the corners, and just outside. Chains
+    /// of a concave outline have no end by themselves, so its formula does not show where it ends.
+    fn octagon(&mut self, corners: &[Point], span: Span) -> Node {
+        let margin = rounding(corners);
+        let (x, y) = (self.module.graph.coordinate(Axis::X), self.module.graph.coordinate(Axis::Y));
+        let (sum, difference) = (self.binary(Binary::Add, x, y, span), self.binary(Binary::Sub, x, y, span));
+        let along: [(Node, fn(&Point) -> f64); 4] =
+            [(x, |p| p[0]), (y, |p| p[1]), (sum, |p| p[0] + p[1]), (difference, |p| p[0] - p[1])];
+        let sides = along.map(|(along, of)| {
+            let [least, most] = corners
+                .iter()
+                .map(of)
+                .fold([f64::INFINITY, f64::NEG_INFINITY], |[lo, hi], value| [lo.min(value), hi.max(value)]);
+            let [least, most] = [least - margin, most + margin].map(|end| self.constant(end));
+            [self.binary(Binary::Sub, along, least, span), self.binary(Binary::Sub, most, along, span)]
+        });
+        self.tree(Binary::Min, sides.as_flattened(), span)
     }
 
     fn explained(&self, flaw: &Flaw, spots: &[Spot], written: &Expr) -> Diagnostic {
@@ -158,6 +179,21 @@ fn is_smooth(corners: &[Point], edge: usize) -> bool {
         [b[0] - a[0], b[1] - a[1]]
     });
     u[0] * v[0] + u[1] * v[1] > SMOOTH * libm::hypot(u[0], u[1]) * libm::hypot(v[0], v[1])
+}
+
+/// How far the formula's corners may lie from those given, for rounding: its lines are off by rounding, and those of a
+/// needle cross far from there.
+fn rounding(corners: &[Point]) -> f64 {
+    let size = corners.as_flattened().iter().fold(0.0_f64, |size, c| size.max(c.abs()));
+    let narrowest = |corner: usize| {
+        let [a, b, c] = [corner - 1, corner, corner + 1].map(|i| corners[i % (corners.len() - 1)]);
+        let (u, v) = ([b[0] - a[0], b[1] - a[1]], [c[0] - b[0], c[1] - b[1]]);
+        let turns_back = u[0] * v[0] + u[1] * v[1] < 0.0;
+        let sine = (u[0] * v[1] - u[1] * v[0]).abs() / (libm::hypot(u[0], u[1]) * libm::hypot(v[0], v[1]));
+        if turns_back { sine } else { 1.0 }
+    };
+    let narrowest = (1..corners.len()).map(narrowest).fold(1.0, f64::min);
+    16.0 * f64::EPSILON * size / narrowest.max(STRAIGHT)
 }
 
 /// Twice the area of the triangle a b c, positive if it runs counter-clockwise; 0 if its corners lie on a line but for

@@ -36,6 +36,28 @@ impl fmt::Display for Exactness {
 
 /// The roots and what they use, simplified.
 pub fn simplify(graph: &Graph, roots: &[Node]) -> (Graph, Vec<Node>, Applied) {
+    let (simplifier, roots) = simplified(graph, roots);
+    let (graph, roots) = simplifier.graph.extract(&roots);
+    (graph, roots, simplifier.applied)
+}
+
+/// A root and what it uses, simplified, with what encloses any of that; `None` if nothing does.
+pub fn simplify_with_hulls(graph: &Graph, root: Node) -> Option<(Graph, Node)> {
+    let enclosed = graph.enclosed(&[root]);
+    if enclosed.is_empty() {
+        return None;
+    }
+    let roots: Vec<Node> =
+        std::iter::once(root).chain(enclosed.into_iter().flat_map(<[Node; 2]>::from)).collect();
+    let (mut simplifier, roots) = simplified(graph, &roots);
+    for pair in roots[1..].chunks_exact(2) {
+        simplifier.graph.enclose(pair[0], pair[1]);
+    }
+    Some((simplifier.graph, roots[0]))
+}
+
+/// What the simplifier makes of some roots, and whatever else it made.
+fn simplified(graph: &Graph, roots: &[Node]) -> (Simplifier, Vec<Node>) {
     let used = graph.reachable(roots);
     let mut simplifier = Simplifier::new(graph, rules::ALL);
     let mut image: Vec<Option<Node>> = vec![None; graph.len()];
@@ -43,9 +65,8 @@ pub fn simplify(graph: &Graph, roots: &[Node]) -> (Graph, Vec<Node>, Applied) {
         let mapped = expr.map(|operand| image[operand.index()].unwrap_or(operand));
         image[node.index()] = Some(simplifier.make(mapped, graph.span(node)));
     }
-    let roots: Vec<Node> = roots.iter().map(|root| image[root.index()].unwrap_or(*root)).collect();
-    let (graph, roots) = simplifier.graph.extract(&roots);
-    (graph, roots, simplifier.applied)
+    let roots = roots.iter().map(|root| image[root.index()].unwrap_or(*root)).collect();
+    (simplifier, roots)
 }
 
 #[cfg(test)]

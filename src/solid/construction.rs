@@ -15,7 +15,7 @@ use crate::geom::{Aabb, Placement, Twist};
 use crate::interval::Interval;
 use crate::ir::{self, Graph, Node, RigidMotion, Uniforms};
 use crate::precision::Precision;
-use crate::simplify::{Applied, simplify};
+use crate::simplify::{Applied, simplify, simplify_with_hulls};
 
 /// An obstacle, compiled.
 ///
@@ -38,6 +38,8 @@ pub(super) struct Inner {
     velocity: OnceLock<Programs>,
     motion: OnceLock<Option<RigidMotion>>,
     parts: OnceLock<Option<LeavesAtAllTimes>>,
+    /// ω with what encloses its parts, if anything does.
+    with_hulls: Option<(Graph, Node)>,
     applied: Applied,
 }
 
@@ -88,14 +90,15 @@ impl Function {
 impl Inner {
     /// The solid taken apart into leaves, once; `None` if that would be too large.
     fn parts(&self) -> Option<LeavesAtAllTimes> {
-        let take_apart = || {
-            let (logic, nodes) = Logic::of(&self.omega.graph, self.omega.root)?;
-            let leaves = LeafStore::new(self.engine, &self.omega.graph, &nodes);
-            let mut words = Vec::new();
-            words::encode(&logic, &mut words);
-            Some((Arc::new(leaves), words.into()))
-        };
-        self.parts.get_or_init(take_apart).clone()
+        self.parts.get_or_init(|| self.taken_apart(&self.omega.graph, self.omega.root)).clone()
+    }
+
+    fn taken_apart(&self, graph: &Graph, root: Node) -> Option<LeavesAtAllTimes> {
+        let (logic, nodes) = Logic::of(graph, root)?;
+        let leaves = LeafStore::new(self.engine, graph, &nodes);
+        let mut words = Vec::new();
+        words::encode(&logic, &mut words);
+        Some((Arc::new(leaves), words.into()))
     }
 }
 
@@ -125,6 +128,7 @@ impl Solid {
         engine: Engine,
         form: Form,
     ) -> Result<Self, CodegenError> {
+        let with_hulls = simplify_with_hulls(graph, root);
         let (graph, roots, applied) = simplify(graph, &[root]);
         let inner = Inner {
             name: name.into(),
@@ -135,6 +139,7 @@ impl Solid {
             velocity: OnceLock::new(),
             motion: OnceLock::new(),
             parts: OnceLock::new(),
+            with_hulls,
             applied,
         };
         let solid = Self { inner: Arc::new(inner), moment: Moment::new(0.0, 0.0) };
@@ -295,6 +300,14 @@ impl Solid {
             let (store, words) = self.inner.parts()?;
             Some(Arc::new(LeafTree { leaves: store.during(from, to), words }))
         })
+    }
+
+    /// The solid taken apart into leaves and what encloses them, to find its bounds; `None` if that would be too large.
+    pub(super) fn parts_with_hulls(&self) -> Option<Arc<LeafTree>> {
+        let Some((graph, root)) = &self.inner.with_hulls else { return self.parts() };
+        let (store, words) = self.inner.taken_apart(graph, *root)?;
+        let Moment { from, to, .. } = *self.moment;
+        Some(Arc::new(LeafTree { leaves: store.during(from, to), words }))
     }
 
     /// Whether machine code answers, rather than the interpreter.

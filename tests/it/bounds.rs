@@ -283,6 +283,55 @@ fn bounded() -> impl Strategy<Value = String> {
     })
 }
 
+/// A blade with this many teeth of the radii 0.6 and 1.
+fn blade(teeth: usize) -> String {
+    let corner = |k: usize| {
+        let (sin, cos) = (std::f64::consts::PI * k as f64 / teeth as f64).sin_cos();
+        let radius = if k % 2 == 0 { 1.0 } else { 0.6 };
+        format!("[{:.6}, {:.6}]", radius * cos, radius * sin)
+    };
+    format!("polygon([{}])", (0..2 * teeth).map(corner).collect::<Vec<_>>().join(", "))
+}
+
+#[test]
+fn blades_of_many_teeth_have_bounds() {
+    // no half-plane of such a formula reaches across a gap between teeth, and all of them cross inside
+    let (low, high) = ([-1.0, -1.0, 0.0], [1.0; 3]);
+    for teeth in [52, 500] {
+        check(&format!("{} and 0 <= z <= 1", blade(teeth)), low, high, 1e-3);
+    }
+    let blade = blade(52);
+    check(
+        &format!("({blade} and 0 <= z <= 1).scale(2).rotate_x(90 deg).move([5, 0, 0])"),
+        [3.0, -2.0, -2.0],
+        [7.0, 0.0, 2.0],
+        1e-3,
+    );
+    // the outermost corners are two to four on a circle
+    let half = 0.5_f64.sqrt();
+    check(
+        &format!("{blade}.rotate_z(45 deg) and 0 <= z <= {half}"),
+        [-1.0, -1.0, 0.0],
+        [1.0, 1.0, half],
+        2e-3,
+    );
+    check(&format!("{blade}.move([2, 0, 0]).revolve()"), [-3.0, -3.0, -1.0], [3.0, 3.0, 1.0], 1e-3);
+    let outside = solid(&format!("not {blade}"));
+    assert!(matches!(outside.bounds(), Bounds::Unbounded), "{:?}", outside.bounds());
+}
+
+#[test]
+fn bounds_hold_the_tip_of_a_needle() {
+    // its edges are off by rounding, and cross farther out than its corner lies
+    let needle = solid("polygon([[0, 0], [1000, 1e-9], [-3, 3e-3], [-1, 1]]) and 0 <= z <= 1");
+    let Bounds::Within(found) = *needle.bounds() else { panic!("{:?}", needle.bounds()) };
+    let tip = (0..100_000).map(|k| 1000.0 + 1e-8 * (f64::from(k) - 5e4));
+    let inside =
+        |x: &f64| (0..7).any(|k| needle.sign(DVec3::new(*x, 1e-9 + f64::from(k - 3) * 1e-14, 0.5)) > 0.0);
+    let farthest = tip.filter(inside).fold(f64::NEG_INFINITY, f64::max);
+    assert!(farthest > 999.0 && farthest <= found.max.x, "{farthest} beyond {}", found.max.x);
+}
+
 #[test]
 fn random_bounded_solids_have_bounds_that_hold_all_their_points() {
     let mut runner = TestRunner::new(config(400));

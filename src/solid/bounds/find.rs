@@ -32,7 +32,7 @@ impl Solid {
 
     /// A box around the solid, which may reach to the ends of the search region; `None` for an empty solid.
     fn hull(&self) -> Option<Aabb> {
-        match self.parts() {
+        match self.parts_with_hulls() {
             Some(parts) => search(&Tree { words: parts.words.clone(), parts }),
             None => search(&WholeFormula::of(self, false)),
         }

@@ -2,7 +2,7 @@
 //!
 //! Negations are pushed down to the leaves and positive factors dropped. The tree has the sign of ω, not its
 //! value; with each leaf times its factors it has the value of the twin, up to rounding, unless a leaf occurs
-//! with several factors.
+//! with several factors. Where the graph knows a hull of a field, the tree has both, joined by "all of".
 
 use std::collections::HashMap;
 
@@ -66,6 +66,17 @@ impl Reader<'_> {
         if above.depth > DEEPEST {
             return None;
         }
+        match self.graph.hull(node).filter(|_| !above.negated) {
+            None => self.read_alone(node, above),
+            Some(hull) => {
+                let hull = self.read_alone(hull, above.below())?;
+                Some(flat(hull, self.read_alone(node, above)?, true))
+            }
+        }
+    }
+
+    /// The tree of a field without its hull.
+    fn read_alone(&mut self, node: Node, above: Above) -> Option<Logic> {
         let (below, negated) = (above.below(), above.negated);
         match SignRule::of(self.graph, node) {
             SignRule::Not(a) => self.read(a, Above { negated: !negated, ..below }),
