@@ -5,7 +5,7 @@ use rfm::field::{Entry, Path, Walls};
 use rfm::geom::Aabb;
 use rfm::glam::DVec3;
 use rfm::ir::exact;
-use rfm::solid::{CellMap, ProgramKind};
+use rfm::solid::{Bounds, CellMap, ProgramKind};
 use rfm::{Engine, Field, Program, Solid};
 
 use crate::random::Random;
@@ -105,6 +105,93 @@ fn random_paths_miss_nothing() {
         }
         assert!(hits > 50, "{}: {hits} hits", solid.name());
         assert!(uncertain <= 2, "{}: {uncertain} of {hits} in doubt", solid.name());
+    }
+}
+
+/// Where a path first has a sample that is not in the fluid.
+fn first_sample(solid: &Solid, from: DVec3, to: DVec3) -> Option<f64> {
+    const SAMPLES: u32 = 2048;
+    let places = (0..=SAMPLES).map(|k| f64::from(k) / f64::from(SAMPLES));
+    let mut before = 0.0;
+    for t in places {
+        if solid.sign(from + (to - from) * t) >= 0.0 {
+            let (mut out, mut inside) = (before, t);
+            for _ in 0..60 {
+                let middle = 0.5 * (out + inside);
+                if solid.sign(from + (to - from) * middle) >= 0.0 { inside = middle } else { out = middle }
+            }
+            return Some(inside);
+        }
+        before = t;
+    }
+    None
+}
+
+/// Paths on which a part of the formula does not change: its derivatives there are 0, or next to nothing.
+#[test]
+fn entries_along_axes_are_where_the_surface_is() {
+    let mut random = Random(3);
+    let heights = [
+        "sqrt(x + 2)",
+        "sin(3*x)",
+        "exp(x)",
+        "x^3",
+        "(x + 2)^0.5",
+        "1/(x + 3)",
+        "atan(x)",
+        "hypot(x, 0.3)",
+        "log2(x + 3)",
+        "cos(z)",
+        "abs(x)",
+        "min(x, 0.2)",
+        "max(x, 0)",
+        "clamp(x, -0.3, 0.4)",
+        "step(0.1, x)",
+        "floor(2*x)",
+        "x*z",
+        "max(x, z)*sin(y)",
+    ];
+    let mut solids: Vec<(Solid, Aabb)> =
+        heights.map(|h| (solid(&format!("y <= {h}")), Aabb::new(DVec3::splat(-1.0), DVec3::ONE))).into();
+    for name in ["bottle", "gear", "hull", "hood", "labyrinth_weir", "screw"] {
+        let path = format!("{}/examples/{name}.rfm", env!("CARGO_MANIFEST_DIR"));
+        let program = Program::from_path(path).unwrap_or_else(|e| panic!("{e}"));
+        let name = program.solids().next().unwrap().to_string();
+        let solid = program.solid(&name).unwrap();
+        let Bounds::Within(bounds) = *solid.bounds() else { panic!("{name}") };
+        solids.push((solid, bounds));
+    }
+    for (solid, around) in solids {
+        let (mut met, mut doubts) = (0, 0);
+        for k in 0..300 {
+            let from = around.centre() + 0.7 * around.size() * random.around(1.0);
+            let mut way = DVec3::ZERO;
+            way[k % 3] = if k % 2 == 0 { around.size()[k % 3] } else { -around.size()[k % 3] };
+            if k % 4 == 3 {
+                way = around.size() * random.around(1.0);
+            }
+            let to = from + way;
+            let Some(truth) = first_sample(&solid, from, to) else { continue };
+            let name = solid.name();
+            let mut path = Path::new(from, to, f64::INFINITY);
+            // where a formula jumps its value may be any between both sides
+            let entry = loop {
+                let entry = Walls::first_entry(&solid, &path);
+                let entry = entry.unwrap_or_else(|| panic!("{name}: {from} → {to} misses {truth}"));
+                if entry.certain {
+                    break entry;
+                }
+                assert!(entry.until < entry.t + 1e-9, "{name}: {from} → {to} is in doubt at {entry:?}");
+                path.start = entry.until.next_up();
+                doubts += 1;
+            };
+            met += 1;
+            // samples may jump over what the path meets before
+            let sign = solid.sign(from + way * (entry.t + 2e-7).min(1.0));
+            let is_there = entry.t <= truth + 1e-12 && (truth - entry.t < 2e-7 || sign >= 0.0);
+            assert!(is_there, "{name}: {from} → {to}: {entry:?}, not {truth}");
+        }
+        assert!(met > 10 && doubts <= met, "{}: {doubts} doubts on {met} paths", solid.name());
     }
 }
 

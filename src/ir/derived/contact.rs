@@ -106,9 +106,11 @@ impl Builder<'_> {
     }
 
     fn kind(&self, node: Node) -> Kind {
-        match self.faces(node) {
-            Some((p, q)) => Kind::Product(p, q),
-            None => Kind::Signs(SignRule::of(self.graph, node)),
+        match SignRule::of(self.graph, node) {
+            SignRule::Leaf => {
+                self.faces(node).map_or(Kind::Signs(SignRule::Leaf), |(p, q)| Kind::Product(p, q))
+            }
+            rule => Kind::Signs(rule),
         }
     }
 

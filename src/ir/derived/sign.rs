@@ -1,7 +1,21 @@
 //! How the sign of ω follows from the signs of its leaves.
 
+use glam::DVec3;
+
+use crate::geom::Aabb;
+use crate::interval::Interval;
+use crate::ir::bounds::range::{RangeEvaluator, Region};
 use crate::ir::graph::{Expr, Graph, Node};
 use crate::ir::op::{Binary, Unary};
+
+/// Factors whose formulas have more nodes are not looked into.
+const MOST_NODES: usize = 48;
+
+/// Where a factor that varies has to be positive: the sign of a solid is asked nowhere else.
+const FARTHEST: f64 = 2e77;
+
+/// A factor that varies lies between these bounds, so that products are 0 nowhere but where the other factor is.
+const FACTORS: Interval = Interval { lo: 1e-9, hi: 1e9 };
 
 /// How the sign of a node follows from its operands.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -12,7 +26,7 @@ pub enum SignRule {
     Any(Node, Node),
     /// The opposite sign of the operand.
     Not(Node),
-    /// A product or quotient with a positive constant: the sign of the other operand.
+    /// A product or quotient with a factor that is proven to be positive: the sign of the other operand.
     Same(Node),
     /// The value itself has to be computed.
     Leaf,
@@ -21,7 +35,10 @@ pub enum SignRule {
 impl SignRule {
     /// The rule for a node of a graph.
     pub fn of(graph: &Graph, node: Node) -> Self {
-        let positive = |node| graph.as_constant(node).is_some_and(|c| c > 0.0 && c.is_finite());
+        let positive = |node| match graph.as_constant(node) {
+            Some(constant) => constant > 0.0 && constant.is_finite(),
+            None => varies_above_zero(graph, node),
+        };
         match graph.expr(node) {
             Expr::Binary(Binary::And | Binary::Min | Binary::PlainMin, u, v) => Self::All(u, v),
             Expr::Binary(Binary::Or | Binary::Max | Binary::PlainMax, u, v) => Self::Any(u, v),
@@ -40,7 +57,7 @@ impl SignRule {
     }
 
     /// The positive constant with which a node multiplies the operand that it has the sign of, see
-    /// [`SignRule::Same`]; 1 for all other nodes.
+    /// [`SignRule::Same`]; 1 for all other nodes, and where the factor varies.
     pub fn factor(graph: &Graph, node: Node) -> f64 {
         let Self::Same(operand) = Self::of(graph, node) else { return 1.0 };
         let expr = graph.expr(node);
@@ -48,6 +65,12 @@ impl SignRule {
             expr.operands().find(|other| *other != operand).and_then(|other| graph.as_constant(other));
         let constant = constant.unwrap_or(1.0);
         if matches!(expr, Expr::Binary(Binary::Div, ..)) { 1.0 / constant } else { constant }
+    }
+
+    /// Whether a node that has the sign of one of its operands multiplies it with something that is no constant.
+    pub fn varies(graph: &Graph, node: Node) -> bool {
+        let Self::Same(operand) = Self::of(graph, node) else { return false };
+        graph.expr(node).operands().any(|other| other != operand && graph.as_constant(other).is_none())
     }
 
     /// The operands that alone decide the sign.
@@ -58,5 +81,69 @@ impl SignRule {
             Self::Leaf => (None, None),
         };
         a.into_iter().chain(b)
+    }
+}
+
+/// Whether a factor that is no constant is proven to be positive: the width of a shape that tapers, for instance.
+fn varies_above_zero(graph: &Graph, node: Node) -> bool {
+    let mut seen = vec![node];
+    let (mut next, mut is_bounded) = (0, false);
+    while let Some(&node) = seen.get(next) {
+        let expr = graph.expr(node);
+        // without one of these a formula is as large as its coordinates
+        is_bounded |=
+            matches!(expr, Expr::Unary(Unary::Call(_), _) | Expr::Binary(Binary::Min | Binary::Max, ..));
+        if matches!(expr, Expr::Parameter(_) | Expr::Uniform(_) | Expr::Lookup(..)) || seen.len() > MOST_NODES
+        {
+            return false;
+        }
+        for operand in expr.operands() {
+            if !seen.contains(&operand) {
+                seen.push(operand);
+            }
+        }
+        next += 1;
+    }
+    is_bounded && {
+        let (small, root) = graph.extract_cone(node);
+        let over = Aabb::new(DVec3::splat(-FARTHEST), DVec3::splat(FARTHEST));
+        let region = Region { time: Interval::new(-FARTHEST, FARTHEST), ..Region::of(&over) };
+        let range = RangeEvaluator::new(&small, root).eval_with(&region);
+        range.lo >= FACTORS.lo && range.hi <= FACTORS.hi
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::ir::{Axis, UnaryFunction};
+
+    #[test]
+    fn factors_that_stay_positive_do_not_matter() {
+        let mut graph = Graph::default();
+        let [x, z, time] = [Axis::X, Axis::Z, Axis::T].map(|axis| graph.coordinate(axis));
+        let [zero, one, part, small] = [0.0, 1.0, -0.4, 1e-12].map(|value| graph.constant(value));
+        let within = graph.binary(Binary::Max, z, zero);
+        let within = graph.binary(Binary::Min, within, one);
+        let part = graph.binary(Binary::Mul, part, within);
+        let width = graph.binary(Binary::Add, one, part);
+        let tapered = graph.binary(Binary::Mul, x, width);
+        assert_eq!(SignRule::of(&graph, tapered), SignRule::Same(x));
+        let divided = graph.binary(Binary::Div, x, width);
+        assert_eq!(SignRule::of(&graph, divided), SignRule::Same(x));
+        let wave = graph.unary(Unary::Call(UnaryFunction::Sin), time);
+        for (factor, is_positive) in [(2.0, true), (0.5, false)] {
+            let level = graph.constant(factor);
+            let level = graph.binary(Binary::Add, level, wave);
+            let waving = graph.binary(Binary::Mul, x, level);
+            assert_eq!(SignRule::of(&graph, waving) == SignRule::Same(x), is_positive, "{factor}");
+        }
+        // it may become so small that the product is 0 before x is
+        let thin = graph.binary(Binary::Add, small, within);
+        // it may be 0, or as large as its coordinates
+        for factor in [within, z, part, thin] {
+            let product = graph.binary(Binary::Mul, x, factor);
+            assert_eq!(SignRule::of(&graph, product), SignRule::Leaf);
+        }
     }
 }

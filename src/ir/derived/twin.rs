@@ -20,7 +20,7 @@ const PROOFS: [(f64, f64); 2] = [(5e9, 1e38), (2e77, 1e308)];
 /// The twin of a root, in the same graph.
 ///
 /// Only the junctions that decide the sign of the root are replaced: those reached from it through ∧, ∨, ¬,
-/// min, max and multiplication by a positive constant. In `(a and b) - 0.1` the value of a ∧ b matters, not
+/// min, max and multiplication by a positive number. In `(a and b) - 0.1` the value of a ∧ b matters, not
 /// its sign, so the difference is a leaf.
 pub fn twin(graph: &mut Graph, root: Node) -> Node {
     let logic = logic_nodes(graph, root);
@@ -42,6 +42,8 @@ pub fn twin(graph: &mut Graph, root: Node) -> Node {
         let result = match SignRule::of(graph, node) {
             SignRule::All(u, v) => joined(graph, [u, v], Binary::PlainMin, Binary::Min),
             SignRule::Any(u, v) => joined(graph, [u, v], Binary::PlainMax, Binary::Max),
+            // a factor that varies would make the twin differ from the tree of leaves, which has constant factors
+            SignRule::Same(u) if SignRule::varies(graph, node) => of(u),
             SignRule::Not(u) | SignRule::Same(u) => {
                 let (new, number) = of(u);
                 let mapped = graph.expr(node).map(|operand| if operand == u { new } else { operand });

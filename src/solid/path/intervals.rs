@@ -168,6 +168,9 @@ fn not_negative([c0, c1, c2]: [f64; 3], width: f64, side: Side) -> PathIntervals
     let size = c1 * c1 + (4.0 * c0 * c2).abs();
     // a root moved away from or towards the part where the polynomial is not negative
     let moved = |root: f64, up: bool| {
+        if root.is_infinite() {
+            return root; // c₂ is next to nothing; infinity less infinity is no number
+        }
         let by = ROUNDINGS * root.abs() + f64::MIN_POSITIVE;
         if up { root + by } else { root - by }
     };

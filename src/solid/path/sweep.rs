@@ -22,23 +22,33 @@ use crate::solid::leaves::words::{Word, is_negative, skip};
 /// Undecided stretches shorter than this part of the path are not narrowed further.
 const SHORTEST: f64 = 1e-12;
 
-/// Maximum number of enclosures for one path. A path needs a handful, or some forty where a leaf has no slope
-/// at a root; what is undecided then stays possible.
+/// Maximum number of enclosures for one stretch of a path. A path needs a handful, or some forty where a leaf has no
+/// slope at a root; what is undecided then stays possible.
 const MOST_ENCLOSURES: u32 = 1_000;
+
+/// How often a path may be halved because all enclosures were spent on it: a wheel of sixty teeth has as many places
+/// without a slope, most of them behind the entry.
+const MOST_HALVINGS: u32 = 32;
 
 /// Leaves whose distances from the entry differ by less than this part of the path decide together.
 const TOGETHER: f64 = 1e-9;
+
+/// An entry is certain if a point that is surely not in the fluid follows within this part of the path: where the search
+/// has spent its budget, the path may be known to meet the solid, but not where.
+const SOON: f64 = 1e-7;
 
 /// A path through the leaves of a solid.
 pub struct Sweep<'a> {
     leaves: &'a Leaves,
     path: &'a Path,
+    /// Those that are left.
     enclosures: Cell<u32>,
+    halvings: Cell<u32>,
 }
 
 impl<'a> Sweep<'a> {
     pub fn new(leaves: &'a Leaves, path: &'a Path) -> Self {
-        Self { leaves, path, enclosures: Cell::new(MOST_ENCLOSURES) }
+        Self { leaves, path, enclosures: Cell::new(MOST_ENCLOSURES), halvings: Cell::new(MOST_HALVINGS) }
     }
 
     /// Whether the whole path surely stays out of a tree, by bounds alone: cheaper than its stretches, and
@@ -61,8 +71,27 @@ impl<'a> Sweep<'a> {
         }
         let met = self.stretches(words, &mut 0, within);
         let (t, until) = met.possible.iter().next()?;
-        let certain = !met.certain.within((t, until)).is_empty();
+        let certain = !met.certain.within((t, until.min(t + SOON))).is_empty();
+        let halvings = self.halvings.get();
+        if !certain && until - t > SOON && self.enclosures.get() == 0 && halvings > 0 {
+            self.halvings.set(halvings - 1);
+            let middle = 0.5 * (t + until);
+            if let Some(entry) = self.search_anew(words, (t, middle)) {
+                // what was cut off at the middle may go on
+                return Some(Entry {
+                    until: if entry.until < middle { entry.until } else { until },
+                    ..entry
+                });
+            }
+            return self.search_anew(words, (middle, within.1));
+        }
         Some(Entry::new(self.path, (t, until), certain, self.normals(words, t)))
+    }
+
+    /// The first entry on a part of the path, with all enclosures for itself.
+    fn search_anew(&self, words: &[u32], within: (f64, f64)) -> Option<Entry> {
+        self.enclosures.set(MOST_ENCLOSURES);
+        self.first_entry(words, within)
     }
 
     /// Where a tree may be at least zero on a part of the path.
