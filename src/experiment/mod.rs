@@ -17,6 +17,7 @@ mod deviation;
 mod drag;
 mod dry;
 mod every;
+mod fall;
 mod filling;
 mod fingerprint;
 mod layers;
@@ -105,7 +106,8 @@ impl Experiment {
         let fluid = program.compile(&scene.fluid.name, scene.fluid.shape, engine)?;
         let parts = bodies::compile(&program, &scene, engine)?;
         let by_walls = bodies::greatest_speed(&program, &scene, &parts);
-        let seen_speed = parameters::typical_speed(&program, &scene).max(by_walls.by_motion);
+        let stirs = by_walls.by_motion > 0.0 || parts.iter().any(|part| part.whole.moves());
+        let seen_speed = parameters::typical_speed(&program, &scene, &fluid, stirs).max(by_walls.by_motion);
         let typical_speed = seen_speed.max(by_walls.by_pressure);
         let mass = filling::mass_by_number(&scene, &fluid).unwrap_or(scene.fluid.mass);
         let mut parameters = parameters::of_scene(&program, &scene, mass, typical_speed);

@@ -2,12 +2,12 @@
 
 use glam::DVec3;
 
-use super::{vector_field, velocities};
-use crate::Program;
+use super::{fall, vector_field, velocities};
 use crate::diagnostic::{Code, Diagnostic};
 use crate::ir::Node;
 use crate::lower::{Gravity, Scene};
 use crate::sph::{ClampedBy, Method, Parameters, Slip};
+use crate::{Program, Solid};
 
 /// The length of a simulation's steps, and where it comes from.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -23,12 +23,13 @@ pub struct TimeStep {
 const MANY_INSTANTS: usize = 256;
 const SOME_INSTANTS: usize = 13;
 
-/// A speed that the fluid can reach by its velocity at the start and a fall through the box, m/s.
-pub(super) fn typical_speed(program: &Program, scene: &Scene) -> f64 {
+/// A speed that the fluid can reach by its velocity at the start and a fall, m/s. `stirs` says whether something moves
+/// that may lift it.
+pub(super) fn typical_speed(program: &Program, scene: &Scene, shape: &Solid, stirs: bool) -> f64 {
     let size = scene.domain.size();
     let along = |gravity: DVec3| gravity.length() * gravity.normalize_or_zero().abs().dot(size);
     let fall = match &scene.gravity {
-        Gravity::Still(gravity) => along(*gravity),
+        Gravity::Still(gravity) => gravity.length() * fall::height(shape, &scene.domain, *gravity, stirs),
         Gravity::Turning(nodes) => {
             let gravity = vector_field(program, nodes);
             instants(scene, MANY_INSTANTS).map(|time| along(gravity(DVec3::ZERO, time))).fold(0.0, f64::max)

@@ -4,6 +4,7 @@
 //! ones. From below it is bounded by the nearest cell that may hold such a point, see `bounds::contraction`.
 //! Neither needs a gradient, so axes, medial surfaces and places without a normal are like any others.
 
+use std::cell::Cell;
 use std::collections::BinaryHeap;
 use std::sync::Arc;
 
@@ -11,7 +12,7 @@ use glam::DVec3;
 
 use super::bounds::contraction::Tree;
 use super::bounds::queue::Queued;
-use super::bounds::search::{Effort, SEARCH_RADIUS, Shrink};
+use super::bounds::search::{Effort, NODES_PER_WORK, SEARCH_RADIUS, Shrink};
 use super::bounds::whole::WholeFormula;
 use super::construction::Solid;
 use super::leaves::words;
@@ -33,6 +34,8 @@ pub struct Distance {
 /// A solid and its complement, prepared for many distance queries.
 pub struct Distances {
     solid: Solid,
+    /// What a sign at a point costs, in the unit of the work.
+    work_of_sign: usize,
     /// Where ω is positive, and where it is negative.
     positive: Target,
     negative: Target,
@@ -51,6 +54,9 @@ const MOST_CELLS: usize = 1_000;
 
 /// Work for one point, in the unit of `bounds::search`.
 const MOST_WORK: usize = 100_000;
+
+/// Operations of machine code that take as long as a node of a formula whose range is found.
+const OPERATIONS_OF_NODE: usize = 8;
 
 /// Number of times that the length of a ray is doubled.
 const DOUBLINGS: i32 = 60;
@@ -108,7 +114,9 @@ impl Distances {
                 (whole(false), whole(true))
             }
         };
-        Self { solid: solid.clone(), positive, negative }
+        let (graph, _) = solid.formula();
+        let work_of_sign = 1 + graph.len() / (OPERATIONS_OF_NODE * NODES_PER_WORK);
+        Self { solid: solid.clone(), work_of_sign, positive, negative }
     }
 
     /// How far a point is from the surface. All numbers are NaN where the sign is.
@@ -130,7 +138,15 @@ impl Distances {
 
     /// A bound from below, one from above, and the point that proves the latter.
     fn search<S: Shrink>(&self, target: &S, sign: f64, p: DVec3) -> (f64, f64, DVec3) {
-        let mut best = Best { solid: &self.solid, sign, p, distance: f64::INFINITY, point: DVec3::NAN };
+        let mut best = Best {
+            solid: &self.solid,
+            sign,
+            p,
+            distance: f64::INFINITY,
+            point: DVec3::NAN,
+            work_of_sign: self.work_of_sign,
+            work: Cell::new(MOST_WORK),
+        };
         self.rays(&mut best);
         best.turn();
         let reach = DVec3::splat(best.distance.min(2.0 * SEARCH_RADIUS));
@@ -144,14 +160,14 @@ impl Distances {
         }
         // the nearest box comes first
         let mut queue = BinaryHeap::from([Queued { rank: -distance_to(&around, p), space: around, known }]);
-        let (mut cells, mut work) = (0, MOST_WORK);
+        let mut cells = 0;
         while let Some(Queued { rank, space, known }) = queue.pop() {
             let distance = -rank;
-            if distance >= (1.0 - GAP) * best.distance || cells == MOST_CELLS || work == 0 {
+            if distance >= (1.0 - GAP) * best.distance || cells == MOST_CELLS || best.is_spent() {
                 return (distance.min(best.distance), best.distance, best.point);
             }
             cells += 1;
-            work = work.saturating_sub(target.work(&known));
+            best.spend(target.work(&known));
             let before = best.distance;
             best.try_cell(&space);
             if best.distance < before * (1.0 - GAP) {
@@ -182,7 +198,7 @@ impl Distances {
                     best.try_ray(best.p + reach * direction);
                 }
             }
-            if best.distance.is_finite() {
+            if best.distance.is_finite() || best.is_spent() {
                 break;
             }
         }
@@ -197,11 +213,23 @@ struct Best<'a> {
     p: DVec3,
     distance: f64,
     point: DVec3,
+    work_of_sign: usize,
+    /// What may still be spent on the point.
+    work: Cell<usize>,
 }
 
 impl Best<'_> {
+    fn spend(&self, work: usize) {
+        self.work.set(self.work.get().saturating_sub(work));
+    }
+
+    fn is_spent(&self) -> bool {
+        self.work.get() == 0
+    }
+
     /// Whether a point is on the other side, or on the surface.
     fn is_other(&self, q: DVec3) -> bool {
+        self.spend(self.work_of_sign);
         let product = self.solid.sign(q) * self.sign;
         product < 0.0 || product == 0.0 && self.is_on_surface(q)
     }
@@ -248,6 +276,9 @@ impl Best<'_> {
         let steps = DVec3::new(1.0 / G, 1.0 / (G * G), 1.0 / (G * G * G));
         for k in 0..SCATTERED {
             let share = (0.5 + steps * f64::from(k)).fract();
+            if self.is_spent() {
+                return;
+            }
             self.try_ray(space.min + share * space.size());
         }
     }
@@ -275,7 +306,7 @@ impl Best<'_> {
     fn turn(&mut self) {
         let mut angle = WIDEST_TURN;
         for _ in 0..MOST_ROUNDS {
-            if !self.distance.is_finite() || angle <= LEAST_TURN {
+            if !self.distance.is_finite() || angle <= LEAST_TURN || self.is_spent() {
                 return;
             }
             let (before, direction) = (self.distance, (self.point - self.p).normalize_or_zero());
