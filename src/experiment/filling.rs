@@ -20,7 +20,7 @@ use super::{
     Experiment,
     layers::{Chords, Layers},
     refuse,
-    room::{LEAST_ROOM, part_in_box, quick_fields},
+    room::{LEAST_ROOM, part_in_box, quick_field, quick_fields},
 };
 use crate::compile::Error;
 use crate::diagnostic::{Code, Diagnostic};
@@ -98,7 +98,8 @@ pub fn spacing(program: &Program, scene: &Scene, engine: Engine) -> Result<f64, 
 pub(super) fn mass_by_number(scene: &Scene, shape: &Solid) -> Option<f64> {
     let number = scene.fluid.particles.filter(|_| scene.fluid.size_span.is_none())?;
     let within = part_in_box(shape, &scene.domain)?;
-    let volume = Region { shape, bodies: Vec::new(), within }.volume();
+    let shape = quick_field(shape, within);
+    let volume = Region { shape: &*shape, bodies: Vec::new(), within }.volume();
     (volume > 0.0 && volume.is_finite()).then(|| scene.fluid.density * volume / number as f64)
 }
 
@@ -117,7 +118,8 @@ impl Experiment {
         }
         let quick = quick_fields(self.bodies.iter().map(|body| &body.solid), within);
         let bodies = quick.iter().map(|field| &**field as &dyn Field).collect();
-        let volume = Region { shape: &self.fluid, bodies, within }.volume();
+        let shape = quick_field(&self.fluid, within);
+        let volume = Region { shape: &*shape, bodies, within }.volume();
         let is_measured = volume > 0.0 && volume.is_finite();
         if !is_measured {
             // a shape too thin for its volume to be found may still hold sites of a lattice
@@ -125,7 +127,7 @@ impl Experiment {
         }
         // other methods do not ask, and many bodies take time
         let fills_vessel = self.parameters.keeps_density() && self.free_volume(0.0) < LEAST_ROOM * volume;
-        let alone = Region { shape: &self.fluid, bodies: Vec::new(), within }.volume();
+        let alone = Region { shape: &*shape, bodies: Vec::new(), within }.volume();
         let taken = (alone - volume).max(0.0);
         let (mut particles, mut carved, cell) = self.fit(obstacles, within, volume, taken)?;
         if let Some(number) = fluid.particles {

@@ -172,6 +172,11 @@ impl Experiment {
         self.parameters.expected_speed
     }
 
+    /// The greatest speed that the fluid has at its start, m/s.
+    pub fn start_speed(&self) -> f64 {
+        parameters::fastest(&self.program, &self.scene)
+    }
+
     /// The outside of the container, if the scene has one, and the obstacles.
     pub fn bodies(&self) -> &[Body] {
         &self.bodies

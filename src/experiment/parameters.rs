@@ -260,7 +260,7 @@ fn instants(scene: &Scene, number: usize) -> impl Iterator<Item = f64> + use<'_>
 }
 
 /// The greatest speed at the start, m/s, of the points of a grid over the box.
-fn fastest(program: &Program, scene: &Scene) -> f64 {
+pub(super) fn fastest(program: &Program, scene: &Scene) -> f64 {
     let velocities = velocities(program, &scene.fluid);
     most(scene, |p| velocities(p, 0.0).length())
 }

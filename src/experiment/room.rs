@@ -453,20 +453,22 @@ pub fn taken_by_obstacles(fluid: &Solid, obstacles: &[Solid], domain: &Aabb) -> 
     let free = || {
         let quick = quick_fields(obstacles, within);
         let bodies = quick.iter().map(|field| &**field as &dyn Field).collect();
-        Region { shape: fluid, bodies, within }.volume()
+        Region { shape: &*quick_field(fluid, within), bodies, within }.volume()
     };
     Some(Taken { part: taken / all, is_all: taken == all && free() == 0.0 })
 }
 
-/// Fields with the signs and surfaces of solids in a box, which for solids of many parts cost less than ω itself.
+/// A field with the signs and the surface of a solid in a box, which for a solid of many parts costs less than ω itself.
+pub(super) fn quick_field(solid: &Solid, over: Aabb) -> Box<dyn Walls> {
+    if solid.has_many_leaves() { solid.surface(over) } else { Box::new(solid.clone()) }
+}
+
+/// [`quick_field`] of several solids.
 pub(super) fn quick_fields<'s>(
     solids: impl IntoIterator<Item = &'s Solid>,
     over: Aabb,
 ) -> Vec<Box<dyn Walls>> {
-    let quick = |solid: &Solid| -> Box<dyn Walls> {
-        if solid.has_many_leaves() { solid.surface(over) } else { Box::new(solid.clone()) }
-    };
-    solids.into_iter().map(quick).collect()
+    solids.into_iter().map(|solid| quick_field(solid, over)).collect()
 }
 
 /// Points in the middles of equal cells that fill a box.

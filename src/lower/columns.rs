@@ -18,7 +18,7 @@ impl Lowering<'_> {
         let Some(path) = self.path(&values[0], "points(\"wing.csv\")", span) else { return Value::Failed };
         let refused = |reason: String| {
             Diagnostic::error(Code::FILE, span, format!("`{path}` cannot be read: {reason}")).help(
-                "each line has the same count of numbers, one to three, with commas or spaces between them",
+                "each line has the same count of numbers, one to three, with commas, semicolons or spaces between them",
             )
         };
         let text = match self.read_file(&path, span) {
@@ -135,6 +135,12 @@ fn numbers(text: &str) -> Result<Vec<Vec<f64>>, String> {
             }
             return Err(format!("line {} has something else than numbers", i + 1));
         };
+        if line.split(';').nth(1).is_some() && line.contains(',') {
+            let number = i + 1;
+            return Err(format!(
+                "line {number} has commas between semicolons; numbers have a decimal point, as in 0.5"
+            ));
+        }
         if !numbers.iter().all(|number| number.is_finite()) {
             return Err(format!("line {} has a number that is not finite", i + 1));
         }
@@ -160,6 +166,7 @@ mod tests {
     fn rows_that_differ_are_refused() {
         for (text, words) in [
             ("", "no numbers"),
+            ("x;y\n0,5;0,25\n", "line 2 has commas between semicolons; numbers have a decimal point"),
             ("title\n", "no numbers"),
             ("1 2\n1 2 3\n", "row 2 has 3 numbers and not 2"),
             ("1 2 3 4\n", "its first row has 4 numbers"),

@@ -6,7 +6,7 @@ use super::lowering::{Local, Lowering};
 use super::value::Value;
 use crate::diagnostic::{Code, Diagnostic, Span};
 use crate::ir::{Binary, Node};
-use crate::syntax::ast::{Expr, Fold, Logic, Members, Name};
+use crate::syntax::ast::{Expr, ExprKind, Fold, Logic, Members, Name};
 
 /// The most members of a fold. The budget of nodes is checked after each member, so this only bounds folds
 /// whose members add no node.
@@ -121,6 +121,8 @@ impl Lowering<'_> {
     /// The numbers of a range `start..end`.
     fn range(&mut self, op: Fold, start: &Expr, end: &Expr) -> Option<Arc<[Value]>> {
         let whole = start.span.to(end.span);
+        // the number of copies may be a param, and 1
+        let is_written = [start, end].iter().all(|end| matches!(end.kind, ExprKind::Number(_)));
         let (start, end) = (
             self.constant_expr(start, "the start of a range"),
             self.constant_expr(end, "the end of a range"),
@@ -148,7 +150,7 @@ impl Lowering<'_> {
             self.report(Diagnostic::error(Code::TOO_LARGE, whole, message));
             return None;
         }
-        if end - start == 1.0 && matches!(op, Fold::Any | Fold::All) {
+        if end - start == 1.0 && is_written && matches!(op, Fold::Any | Fold::All) {
             self.report(Diagnostic::warning(
                 Code::FOLD_OF_ONE,
                 whole,

@@ -95,7 +95,7 @@ impl Pictures {
         // a fall is stopped on its way, what drives a fluid otherwise is not
         let share = if experiment.typical_speed() > 0.0 { FASTEST } else { 1.0 };
         let stated = experiment.scene().picture.fastest;
-        let fastest = stated.unwrap_or(share * experiment.speed_scale());
+        let fastest = stated.unwrap_or((share * experiment.speed_scale()).max(experiment.start_speed()));
         let body = |(solid, drawn): (&Solid, Drawn)| {
             let near = (!solid.moves() && solid.has_many_leaves()).then(|| solid.surface(domain));
             Body { solid: solid.clone(), drawn, near }
