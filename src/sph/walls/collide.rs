@@ -2,8 +2,18 @@
 
 use glam::DVec3;
 
+use super::all_directions::nearest_all_around;
 use super::contact::{Contact, Undefined, bounce, push_out};
 use crate::field::{Normals, Walls};
+
+/// The longest reach, m, that is searched at once.
+const LONG: f64 = 4096.0;
+
+/// Each search of a longer reach goes this much farther than the last.
+const LENGTHENS: f64 = 64.0;
+
+/// Number of these searches: the last goes 64⁶ m ≈ 7e10 m.
+const LENGTHENED: i32 = 7;
 
 /// How walls act on a particle that has entered them.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -83,7 +93,7 @@ pub fn put_back(
     }
     let contact = match through_one_face(walls, *position, rebound.reach) {
         Some(contact) => Ok(Some(contact)),
-        None => way_out(walls, *position, rebound.reach),
+        None => way_out_nearby(walls, *position, rebound.reach),
     };
     let contact = match contact {
         Ok(Some(contact)) => contact,
@@ -132,6 +142,24 @@ fn least_step(at: DVec3) -> f64 {
     (8.0 * f64::EPSILON * at.abs().max_element()).max(f64::MIN_POSITIVE)
 }
 
+/// The way out within reach. A search looks at a fixed number of lengths, and finds a place to the rounding errors of the
+/// longest: so where the reach is very long, or has no end, places within a metre are searched first, and farther ones
+/// only if there are none.
+fn way_out_nearby(walls: &dyn Walls, from: DVec3, reach: f64) -> Result<Option<Contact>, Undefined> {
+    if reach <= LONG {
+        return way_out(walls, from, reach);
+    }
+    for k in 0..LENGTHENED {
+        match way_out(walls, from, reach.min(LENGTHENS.powi(k))) {
+            Ok(None) => {}
+            // far away, formulas overflow
+            Err(_) if k > 0 => return Ok(None),
+            found => return found,
+        }
+    }
+    Ok(None)
+}
+
 /// The nearest place outside, with all faces that are passed on the way there: in a corner of a vessel a particle is
 /// behind several, and must not keep its speed towards any of them.
 fn way_out(walls: &dyn Walls, from: DVec3, reach: f64) -> Result<Option<Contact>, Undefined> {
@@ -155,7 +183,11 @@ fn way_out(walls: &dyn Walls, from: DVec3, reach: f64) -> Result<Option<Contact>
         }
         here += normal * (w / gradient.length()).max(least_step(here));
     }
-    Ok(found.filter(|contact| contact.point.distance(from) <= reach).map(|mut contact| {
+    let is_near = |contact: &Contact| contact.point.distance(from) <= reach;
+    let Some(found) = found.filter(is_near) else {
+        return Ok(nearest_all_around(walls, from, reach)?.filter(is_near));
+    };
+    Ok(Some(found).map(|mut contact| {
         let mut faces = Normals::default();
         passed
             .iter()
@@ -177,6 +209,7 @@ fn is_alike(a: DVec3, b: DVec3) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::field::Closures;
     use crate::sph::scenes;
 
     /// Works from the middle too, where the gradient vanishes.
@@ -191,6 +224,31 @@ mod tests {
             assert!((place.length() - 1.0).abs() < 1e-12 && velocity.is_finite(), "{x}: {place}");
             assert!((velocity.length_squared() - 10.0).abs() < 1e-9, "{x}: {velocity}");
         }
+    }
+
+    /// A ball's Newton step is up to half its radius too long, and from the middle there is none.
+    #[test]
+    fn a_reach_from_the_least_to_none_finds_the_way_out_of_a_ball() {
+        let ball = scenes::sphere(DVec3::ZERO, 1.0);
+        for place in [DVec3::ZERO, DVec3::splat(1e-120), DVec3::splat(0.1), DVec3::splat(0.3), DVec3::Y * 0.2]
+        {
+            let depth = 1.0 - place.length();
+            for reach in [depth + 1e-9, 1.01 * depth, 1.2 * depth, 10.0, 5000.0, 1e6, 1e100, f64::INFINITY] {
+                let rebound = Rebound::new(0.0, 0.0, reach).unwrap();
+                let mut now = place;
+                let found = collide(&*ball, &rebound, &mut now, &mut DVec3::ZERO.clone());
+                assert_eq!(found, Some(Collision::Hit), "{place}, {reach}");
+                assert!((now.length() - 1.0).abs() < 1e-12, "{place}, {reach}: {now}");
+                assert!(now.distance(place) <= reach, "{place}, {reach}: {now}");
+            }
+            let rebound = Rebound::new(0.0, 0.0, 0.99 * depth).unwrap();
+            let found = collide(&*ball, &rebound, &mut place.clone(), &mut DVec3::ZERO.clone());
+            assert_eq!(found, Some(Collision::Stuck), "{place}");
+        }
+        let everywhere = Closures { omega: |_: DVec3| 1.0, gradient: |_: DVec3| DVec3::ZERO };
+        let rebound = Rebound::new(0.0, 0.0, f64::INFINITY).unwrap();
+        let found = collide(&everywhere, &rebound, &mut DVec3::ZERO.clone(), &mut DVec3::ZERO.clone());
+        assert_eq!(found, Some(Collision::Stuck));
     }
 
     #[test]

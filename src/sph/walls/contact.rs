@@ -169,21 +169,7 @@ pub(super) fn push_out_to(
     clearance: f64,
     is_wanted: impl Fn(DVec3) -> bool,
 ) -> Result<Option<Contact>, Undefined> {
-    let contact = |from: DVec3, to: DVec3| -> Result<Contact, Undefined> {
-        let (outer, inner) = (omega(field, to)?, omega(field, from)?);
-        let path = Path::new(to, from, f64::INFINITY);
-        // the obstacle is taken at the end of the step, not on its way there
-        let fraction = last_outside(|t| field.omega(path.at(t)), &path, (0.0, outer), (1.0, inner));
-        let point = path.at(fraction);
-        let mut faces = Normals::default();
-        let normal = normal(field, point, to - from)?;
-        faces.add(normal);
-        // a little farther, so that the next path does not begin on the surface itself
-        let lifted = point + clearance * normal;
-        let point = if omega(field, lifted)? < 0.0 { lifted } else { point };
-        Ok(Contact { fraction, point, normal, faces })
-    };
-
+    let contact = |from, to| contact_between(field, from, to, clearance);
     let mut here = inside;
     for _ in 0..8 {
         let (w, gradient) = field.omega_grad(here);
@@ -227,6 +213,28 @@ pub(super) fn push_out_to(
         }
     }
     Ok(None)
+}
+
+/// The contact where a straight way from a place inside to one outside leaves the obstacle, `clearance`, m, farther if
+/// that is in the fluid. If the way leaves it more than once, it is any of these places.
+pub(super) fn contact_between(
+    field: &dyn Walls,
+    inside: DVec3,
+    outside: DVec3,
+    clearance: f64,
+) -> Result<Contact, Undefined> {
+    let (outer, inner) = (omega(field, outside)?, omega(field, inside)?);
+    let path = Path::new(outside, inside, f64::INFINITY);
+    // the obstacle is taken at the end of the step, not on its way there
+    let fraction = last_outside(|t| field.omega(path.at(t)), &path, (0.0, outer), (1.0, inner));
+    let point = path.at(fraction);
+    let mut faces = Normals::default();
+    let normal = normal(field, point, outside - inside)?;
+    faces.add(normal);
+    // a little farther, so that the next path does not begin on the surface itself
+    let lifted = point + clearance * normal;
+    let point = if omega(field, lifted)? < 0.0 { lifted } else { point };
+    Ok(Contact { fraction, point, normal, faces })
 }
 
 /// A velocity (or a displacement) reflected by each of several faces into which it points, one after the

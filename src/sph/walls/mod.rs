@@ -8,6 +8,7 @@
 //! Field::first_entry ─▶ Contact ─▶ Boundary::collide: position and velocity
 //! ```
 
+mod all_directions;
 mod behind;
 mod boundary;
 mod broad_phase;

@@ -336,8 +336,8 @@ impl PySolid {
     /// Puts particles that are inside the solid, or on its surface, back outside, and reflects their velocities
     /// relative to that of the surface. Both arrays are changed in place; particles that stay outside keep their bits.
     /// A particle goes to the nearest place outside if it is not deep in the solid, as after a step. From
-    /// deeper it goes where the formula's slope leads if that is within ``reach``, and otherwise the shortest way along
-    /// an axis: either may be farther than the nearest place.
+    /// deeper it goes where the formula's slope leads if that is within ``reach``, otherwise the shortest way along an
+    /// axis, and if there is none, one that is found in all directions: each may be farther than the nearest place.
     ///
     /// Parameters
     /// ----------

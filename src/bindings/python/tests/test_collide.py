@@ -133,3 +133,32 @@ def test_elements_that_are_one_do_no_harm(pawn):
     pawn.collide(one, one, reach=1.0, threads=2)
     with pytest.raises(ValueError):
         pawn.within([0, 0, 0, np.nan, 1, 1])
+
+
+@pytest.mark.parametrize(
+    ("solid", "place", "away", "reach"),
+    [
+        ("sphere(1)", [0.3, 0.3, 0.3], 0.4804, 0.5),
+        ("ellipsoid(1, 1, 0.9)", [0.3, 0.3, 0.3], 0.46, 0.5),
+        ("smooth_or(sphere(0.5), box([0, 0, 0], [1, 1, 1]), 0.2)", [0.059, 0.1036, 0.1433], 0.352, 0.5),
+        ("box([-1, -1, -1], [1, 1, 1]).rotate([1, 1, 1], 0.7)", [0.1, 0.2, 0.3], 0.728, 0.8),
+    ],
+)
+def test_a_way_out_within_reach_is_found(solid, place, away, reach):
+    solid = rfm.load(f"rfm 1\nsolid s = {solid}")["s"]
+    for longer in (reach, 1.5 * reach, 10.0, 1e100, np.inf):
+        x = np.array([place])
+        assert solid.collide(x, np.zeros((1, 3)), reach=longer) == (1, 0, 0), longer
+        assert solid.sign(x)[0] < 0 and np.linalg.norm(x[0] - place) <= longer
+        if longer == reach:
+            assert np.linalg.norm(x[0] - place) < 1.1 * away
+    x = np.array([place])
+    assert solid.collide(x, np.zeros((1, 3)), reach=0.9 * away) == (0, 1, 0) and (x == [place]).all()
+
+
+def test_a_reach_may_have_no_end():
+    ball = rfm.load("rfm 1\nsolid s = sphere(1)")["s"]
+    for reach in (1e100, np.inf):
+        x = np.zeros((1, 3))
+        assert ball.collide(x, np.zeros((1, 3)), reach=reach) == (1, 0, 0)
+        assert np.linalg.norm(x) == pytest.approx(1.0, abs=1e-12)
