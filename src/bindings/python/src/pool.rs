@@ -10,7 +10,7 @@ use std::ops::Range;
 use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{RecvTimeoutError, sync_channel};
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 use std::time::{Duration, Instant};
 
 use pyo3::exceptions::{PyRuntimeError, PyValueError};
@@ -64,9 +64,15 @@ impl<'py> FromPyObject<'_, 'py> for Threads {
         let positive = usize::try_from(count).ok().and_then(NonZeroUsize::new);
         let count = positive
             .ok_or_else(|| PyValueError::new_err(format!("threads is {count}, expected 1 or more")))?;
-        let most = std::thread::available_parallelism().unwrap_or(NonZeroUsize::MIN);
-        Ok(Self::Exactly(count.min(most)))
+        Ok(Self::Exactly(if count == NonZeroUsize::MIN { count } else { count.min(processors()) }))
     }
+}
+
+/// The number of processors. Linux is asked once: it reads files of control groups for the answer, which takes as long
+/// as ω at a hundred points.
+fn processors() -> NonZeroUsize {
+    static COUNT: OnceLock<NonZeroUsize> = OnceLock::new();
+    *COUNT.get_or_init(|| std::thread::available_parallelism().unwrap_or(NonZeroUsize::MIN))
 }
 
 /// The pool for a number of threads. `py` proves that no other thread of Python forks in the meantime, so that
