@@ -34,7 +34,7 @@ pub use self::{
     error::SliceError,
     isolines::{Polyline, isolines},
     plane::{Axis, Plane, Window},
-    sample::{Samples, sample},
+    sample::{Samples, sample, sample_while},
     sections::Cut,
     sheet::{Panel, write_sheet_png, write_sheet_svg},
 };

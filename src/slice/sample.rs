@@ -35,8 +35,23 @@ pub fn sample(
     window: Window,
     samples: usize,
 ) -> Result<Samples, SliceError> {
+    sample_while(field, plane, window, samples, &|| true)
+}
+
+/// [`sample`] that ends soon after `goes_on` has become false; then samples are missing, and are 0. It is asked before
+/// each row.
+///
+/// # Errors
+/// Those of [`Window::grid`].
+pub fn sample_while(
+    field: &dyn Field,
+    plane: Plane,
+    window: Window,
+    samples: usize,
+    goes_on: &(dyn Fn() -> bool + Sync),
+) -> Result<Samples, SliceError> {
     let (columns, rows) = window.grid(samples)?;
-    Ok(sample_grid(field, plane, window, columns, rows))
+    Ok(sample_grid_while(field, plane, window, (columns, rows), goes_on))
 }
 
 /// Samples a field at given numbers of columns and rows, at least two each. Cells need not be square.
@@ -47,9 +62,22 @@ pub(super) fn sample_grid(
     columns: usize,
     rows: usize,
 ) -> Samples {
+    sample_grid_while(field, plane, window, (columns, rows), &|| true)
+}
+
+fn sample_grid_while(
+    field: &dyn Field,
+    plane: Plane,
+    window: Window,
+    (columns, rows): (usize, usize),
+    goes_on: &(dyn Fn() -> bool + Sync),
+) -> Samples {
     let mut samples = Samples { plane, window, columns, rows, omega: Vec::new() };
     let mut omega = vec![0.0; columns * rows];
     omega.par_chunks_mut(columns).enumerate().for_each(|(row, out)| {
+        if !goes_on() {
+            return;
+        }
         let points: Vec<_> = (0..columns).map(|column| plane.point(samples.position(column, row))).collect();
         let [x, y, z] = [0, 1, 2].map(|axis| points.iter().map(|p| p[axis]).collect::<Vec<_>>());
         field.omega_many(Points::new(&x, &y, &z), out);
@@ -110,7 +138,9 @@ impl Samples {
 #[cfg(test)]
 mod tests {
     use super::{super::tests::disc, *};
+    use crate::field::Closures;
     use crate::slice::Axis;
+    use glam::DVec3;
 
     #[test]
     fn nodes_hold_the_value_of_the_field_there() {
@@ -123,6 +153,16 @@ mod tests {
             assert_eq!(samples.get(column, row), expected);
         }
         assert_eq!(samples.position(8, 4), window.max);
+    }
+
+    #[test]
+    fn samples_end_when_they_are_not_wanted_any_more() {
+        let asked = std::sync::atomic::AtomicUsize::new(0);
+        let inside = Closures { omega: |_: DVec3| 1.0, gradient: |_: DVec3| DVec3::ZERO };
+        let goes_on = || asked.fetch_add(1, std::sync::atomic::Ordering::Relaxed) < 5;
+        let window = Window::new(DVec2::ZERO, DVec2::ONE);
+        let found = sample_while(&inside, Plane::new(Axis::Z, 0.0), window, 20, &goes_on).unwrap();
+        assert_eq!(found.omega.iter().filter(|w| **w > 0.0).count(), 5 * 20);
     }
 
     #[test]

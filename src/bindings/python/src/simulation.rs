@@ -11,12 +11,13 @@ use pyo3::sync::PyOnceLock;
 use pyo3::types::{PyDict, PyTuple, PyType};
 use rfm::diagnostic::Diagnostics;
 use rfm::experiment::{Every, Start, probe_column};
+use rfm::mesh::Watch as _;
 use rfm::sph::{Checkpoint, Gauge, Simulation, StepError};
-use rfm::{Engine, Experiment};
+use rfm::{Engine, Experiment, Program};
 
 use crate::error::{diagnostics, not_read, raised, refused};
 use crate::mesh::write_file;
-use crate::pool::{LOOK, Threads, run};
+use crate::pool::{LOOK, Threads, Watch, run, run_watched};
 use crate::program::PyProgram;
 use crate::show;
 use crate::state::{self, Lent};
@@ -164,19 +165,58 @@ impl State {
     }
 }
 
+/// A scene at its start.
+struct Begun {
+    experiment: Experiment,
+    at_start: Diagnostics,
+    simulation: Simulation,
+    recorders: Vec<Recorder>,
+}
+
+/// Fills a scene with particles. `None` if that is not wanted any more.
+///
+/// # Errors
+/// What is wrong with the scene, or its probes.
+fn begin(file: &Program, scene: &str, watch: &Watch) -> Result<Option<Begun>, NotBegun> {
+    let experiment = Experiment::new(file, scene, Engine::Auto).map_err(NotBegun::Scene)?;
+    if watch.is_over() {
+        return Ok(None);
+    }
+    let Start { mut simulation, warnings, .. } = experiment.start().map_err(NotBegun::Scene)?;
+    if watch.is_over() {
+        return Ok(None);
+    }
+    let mut at_start = experiment.warnings();
+    at_start.list.extend(warnings.list);
+    let recorders = recorders(&experiment, &mut simulation, None).map_err(NotBegun::Probe)?;
+    Ok(Some(Begun { experiment, at_start, simulation, recorders }))
+}
+
+/// Why a scene has no start.
+enum NotBegun {
+    Scene(rfm::Error),
+    Probe(PyErr),
+}
+
+impl NotBegun {
+    fn raised(self, py: Python<'_>) -> PyErr {
+        match self {
+            Self::Scene(error) => raised(py, error),
+            Self::Probe(error) => error,
+        }
+    }
+}
+
 impl PySimulation {
     pub fn new(program: &Bound<'_, PyProgram>, scene: &str, threads: Threads) -> PyResult<Self> {
-        let (py, file) = (program.py(), &program.get().program);
-        let started = run(py, threads, || {
-            let experiment = Experiment::new(file, scene, Engine::Auto)?;
-            let start = experiment.start()?;
-            Ok((experiment, start))
-        })?;
-        let (experiment, start) = started.map_err(|error| raised(py, error))?;
-        let Start { mut simulation, warnings, .. } = start;
-        let mut at_start = experiment.warnings();
-        at_start.list.extend(warnings.list);
-        let recorders = run(py, threads, || recorders(&experiment, &mut simulation, None))??;
+        let py = program.py();
+        let (file, scene) = (program.get().program.clone(), scene.to_string());
+        let begun = run_watched(py, threads, move |watch| begin(&file, &scene, watch))?;
+        let Some(Begun { experiment, at_start, simulation, recorders }) =
+            begun.map_err(|error| error.raised(py))?
+        else {
+            return Err(PyRuntimeError::new_err("the start of the scene was left unfinished"));
+        };
         let now = Mutex::new(Now::of(&simulation));
         let state = State { simulation, recorders, failed: None, lent: Lent::default() };
         Ok(Self {

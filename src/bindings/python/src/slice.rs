@@ -9,12 +9,13 @@ use rfm::Solid;
 use rfm::field::Field;
 use rfm::geom::Aabb;
 use rfm::glam::DVec2;
-use rfm::slice::{self, Axis, Plane, Samples, Window};
+use rfm::mesh::Watch;
+use rfm::slice::{self, Axis, Plane, Samples, SliceError, Window};
 use rfm::solid::Chosen;
 
 use crate::error::refused;
 use crate::mesh::write_file;
-use crate::pool::{Threads, run};
+use crate::pool::{Threads, run_watched};
 
 /// The plane that one of three coordinates states.
 ///
@@ -35,11 +36,24 @@ pub fn plane(coordinates: [Option<f64>; 3]) -> PyResult<Plane> {
     }
 }
 
+/// What is sampled.
+#[derive(Clone)]
+struct Sliced {
+    solid: Solid,
+    /// The cheaper program that keeps the tolerance of the file.
+    chosen: Option<Chosen>,
+}
+
+impl Sliced {
+    fn field(&self) -> &dyn Field {
+        self.chosen.as_ref().map_or(&self.solid, |chosen| chosen)
+    }
+}
+
 /// ω in a plane: samples, and pictures of them.
 #[pyclass(frozen, module = "rfm", name = "Slice")]
 pub struct PySlice {
-    solid: Solid,
-    chosen: Option<Chosen>,
+    sliced: Sliced,
     samples: Samples,
     number: usize,
 }
@@ -65,22 +79,37 @@ impl PySlice {
                 )));
             }
         };
-        let field: &dyn Field = chosen.map_or(solid, |chosen| chosen);
-        let samples = run(py, threads, || slice::sample(field, plane, window, number))?.map_err(refused)?;
-        Ok(Self { solid: solid.clone(), chosen: chosen.cloned(), samples, number })
+        let sliced = Sliced { solid: solid.clone(), chosen: chosen.cloned() };
+        let sampled = sliced.clone();
+        let samples = run_watched(py, threads, move |watch| {
+            slice::sample_while(sampled.field(), plane, window, number, &|| !watch.is_over())
+        })?;
+        Ok(Self { sliced, samples: samples.map_err(refused)?, number })
     }
 
-    fn field(&self) -> &dyn Field {
-        self.chosen.as_ref().map_or(&self.solid, |chosen| chosen)
+    /// The bytes of a picture, drawn from a field with its name, in a part of a plane with a number of samples.
+    fn drawn(
+        &self,
+        py: Python<'_>,
+        draw: impl FnOnce(&dyn Field, &str, Plane, Window, usize, &mut Vec<u8>) -> Result<(), SliceError>
+        + Send
+        + 'static,
+    ) -> PyResult<Vec<u8>> {
+        let (sliced, number) = (self.sliced.clone(), self.number);
+        let Samples { plane, window, .. } = self.samples;
+        run_watched(py, Threads::Auto, move |_| {
+            let mut picture = Vec::new();
+            draw(sliced.field(), sliced.solid.name(), plane, window, number, &mut picture).map(|()| picture)
+        })?
+        .map_err(refused)
     }
 
     /// The drawing as SVG.
-    pub fn svg(&self) -> PyResult<String> {
-        let Samples { plane, window, .. } = self.samples;
-        let mut svg = Vec::new();
-        slice::write_svg(self.field(), self.solid.name(), plane, window, self.number, &mut svg)
-            .map_err(refused)?;
-        String::from_utf8(svg).map_err(refused)
+    pub fn svg(&self, py: Python<'_>) -> PyResult<String> {
+        String::from_utf8(self.drawn(py, |field, name, plane, window, number, svg| {
+            slice::write_svg(field, name, plane, window, number, svg)
+        })?)
+        .map_err(refused)
     }
 
     /// The coordinates of columns or of rows, m.
@@ -133,11 +162,11 @@ impl PySlice {
     /// The drawing as an SVG document: bands of ω, the outline, axes and a bar of colours.
     #[pyo3(name = "svg")]
     fn svg_document(&self, py: Python<'_>) -> PyResult<String> {
-        run(py, Threads::Auto, || self.svg())?
+        self.svg(py)
     }
 
     fn _repr_svg_(&self, py: Python<'_>) -> PyResult<String> {
-        self.svg_document(py)
+        self.svg(py)
     }
 
     /// Writes the drawing to a file, .svg or .png.
@@ -145,16 +174,10 @@ impl PySlice {
         let ending =
             path.extension().map(|ending| ending.to_string_lossy().to_lowercase()).unwrap_or_default();
         let picture = match &*ending {
-            "svg" => self.svg_document(py)?.into_bytes(),
-            "png" => {
-                let Samples { plane, window, .. } = self.samples;
-                let (field, name) = (self.field(), self.solid.name());
-                let mut png = Vec::new();
-                run(py, Threads::Auto, || {
-                    slice::write_png(field, name, plane, window, self.number, 2.0, &mut png).map_err(refused)
-                })??;
-                png
-            }
+            "svg" => self.svg(py)?.into_bytes(),
+            "png" => self.drawn(py, |field, name, plane, window, number, png| {
+                slice::write_png(field, name, plane, window, number, 2.0, png)
+            })?,
             _ => {
                 let path = path.display();
                 return Err(PyValueError::new_err(format!(
@@ -167,6 +190,6 @@ impl PySlice {
 
     fn __repr__(&self) -> String {
         let Samples { plane, rows, columns, .. } = &self.samples;
-        format!("<rfm.Slice of {} in {plane}, {rows} × {columns} samples>", self.solid.name())
+        format!("<rfm.Slice of {} in {plane}, {rows} × {columns} samples>", self.sliced.solid.name())
     }
 }

@@ -44,3 +44,21 @@ def test_a_collision_is_done_whole_or_not_at_all(interrupts):
             x[:] = before
             posts.collide(x, v, reach=1.0)
     assert np.array_equal(x, before) or np.array_equal(x, after)
+
+
+def test_a_slice_is_left_unfinished(interrupts):
+    posts = rfm.load(POSTS)["posts"]
+    with interrupts(5):
+        while True:
+            posts.slice(z=0.5, samples=8192, window=(-10, -10, 11, 11))
+    whole = posts.slice(z=0.5, samples=50)
+    with interrupts(5):
+        while True:
+            whole.svg()
+    assert whole.omega.shape == (50, 50) and (whole.omega > 0).any()
+
+
+def test_the_start_of_a_scene_is_left_unfinished(pawn, interrupts):
+    with interrupts(5):
+        while True:
+            pawn.program.with_params(particles=800_000).scene()
