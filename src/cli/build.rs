@@ -41,8 +41,9 @@ pub(super) fn run(shared: &Shared, options: &Options) -> Result<(), Failure> {
         input::show(&diagnostics);
         return Err(Failure::Findings);
     }
-    let (solid, params) = if options.runtime_params { open(&program, &solid)? } else { (solid, Vec::new()) };
-    let text_options = text_options(&program, &solid, options, params);
+    let opened = if options.runtime_params { Some(open(&program, &solid)?) } else { None };
+    let text_options = text_options(&program, &solid, options, opened.as_ref());
+    let solid = opened.map_or(solid, |opened| opened.solid);
     let made = match kind {
         Kind::Source(target) => {
             let made =
@@ -120,22 +121,23 @@ struct Made {
     operations: usize,
 }
 
-/// The solid with its params as arguments, and what they are.
-fn open(program: &Program, solid: &Solid) -> Result<(Solid, Vec<Param>), Failure> {
+/// A solid with its params as arguments.
+struct Opened {
+    solid: Solid,
+    params: Vec<Param>,
+    /// Those that remain constants.
+    fixed: Vec<String>,
+}
+
+fn open(program: &Program, solid: &Solid) -> Result<Opened, Failure> {
     let (opened, fixed) = program.with_open_params_of([solid.name()]).map_err(choose::usage)?;
     let solid = opened.solid_with(solid.name(), rfm::Engine::Interpreter).map_err(choose::usage)?;
-    if !fixed.is_empty() {
-        note(format!(
-            "{} {} how `{}` is built and {} as in the file",
-            fixed.iter().map(|name| format!("`{name}`")).collect::<Vec<_>>().join(", "),
-            if fixed.len() == 1 { "decides" } else { "decide" },
-            solid.name(),
-            if fixed.len() == 1 { "stays" } else { "stay" },
-        ));
+    if let Some(message) = source::kept_constant(solid.name(), &fixed) {
+        note(message);
     }
     let params = opened.module().params.iter();
     let params = params.map(|p| Param { name: p.name.clone(), value: p.value, doc: p.doc.clone() });
-    Ok((solid, params.collect()))
+    Ok(Opened { solid, params: params.collect(), fixed })
 }
 
 /// The failure of a target that there is no code generator for.
@@ -167,15 +169,22 @@ fn report(shared: &Shared, solid: &Solid, files: &[PathBuf], operations: usize) 
 }
 
 /// How the solid is written.
-fn text_options(program: &Program, solid: &Solid, options: &Options, params: Vec<Param>) -> source::Options {
+fn text_options(
+    program: &Program,
+    solid: &Solid,
+    options: &Options,
+    opened: Option<&Opened>,
+) -> source::Options {
     let file = options.file.shown();
     let mut origin =
         vec![format!("{MADE} {} from {file}, solid {}.", env!("CARGO_PKG_VERSION"), solid.name())];
-    let values: Vec<String> =
-        program.module().params.iter().map(|param| format!("{} = {:?}", param.name, param.value)).collect();
-    if !values.is_empty() && params.is_empty() {
-        origin.push(format!("Params: {}.", values.join(", ")));
-    }
+    let is_constant = |name: &String| opened.is_none_or(|opened| opened.fixed.contains(name));
+    let params = program.params().iter().filter(|param| is_constant(&param.name));
+    origin.extend(source::constants(params.map(|param| (&*param.name, param.value))));
+    origin.extend(
+        opened.and_then(|opened| source::kept_constant(solid.name(), &opened.fixed)).map(|kept| kept + "."),
+    );
+    let params = opened.map_or_else(Vec::new, |opened| opened.params.clone());
     source::Options {
         prefix: options.prefix.clone(),
         sign: options.what.contains(&BuildWhat::Sign),

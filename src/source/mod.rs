@@ -132,6 +132,23 @@ pub struct Param {
     pub doc: Option<String>,
 }
 
+/// The params of a file that are constants in a text, for its head. `None` if there are none.
+pub fn constants<'a>(params: impl IntoIterator<Item = (&'a str, f64)>) -> Option<String> {
+    let values: Vec<String> = params.into_iter().map(|(name, value)| format!("{name} = {value:?}")).collect();
+    (!values.is_empty()).then(|| format!("Params: {}.", values.join(", ")))
+}
+
+/// What users should know of params that were to stay open and cannot. `None` if there are none.
+pub fn kept_constant(solid: &str, fixed: &[String]) -> Option<String> {
+    let (decide, stay) = match fixed {
+        [] => return None,
+        [_] => ("decides", "stays"),
+        _ => ("decide", "stay"),
+    };
+    let names: Vec<String> = fixed.iter().map(|name| format!("`{name}`")).collect();
+    Some(format!("{} {decide} how `{solid}` is built and {stay} as in the file", names.join(", ")))
+}
+
 /// How a solid is written.
 #[derive(Debug, Clone, Default)]
 pub struct Options {

@@ -320,6 +320,27 @@ fn only_what_a_solid_takes_from_another_file_decides_which_params_are_constants(
     assert_eq!(fixed("own"), ["parts.n"]);
 }
 
+#[test]
+fn params_that_stay_constant_are_named_in_the_text() {
+    let build = |arguments: &[&str]| {
+        let folder = tempfile::tempdir().unwrap();
+        std::fs::write(
+            folder.path().join("a.rfm"),
+            "rfm 1\nparam a = 0.5\nparam b = 2\nsolid s = sphere(b).scale(a)\n",
+        )
+        .unwrap();
+        crate::tool::rfm(folder.path(), &[&["build", "a.rfm", "-o", "a.c"], arguments].concat()).expect(0);
+        std::fs::read_to_string(folder.path().join("a.c")).unwrap()
+    };
+    assert!(build(&[]).contains(" * Params: a = 0.5, b = 2.0.\n"));
+    let open = build(&["--runtime-params"]);
+    assert!(
+        open.contains(" * Params: a = 0.5.\n * `a` decides how `s` is built and stays as in the file.\n"),
+        "{open}"
+    );
+    assert!(open.contains("double b;") && !open.contains("double a;"));
+}
+
 /// ω and signs to the bit. The sums of a gradient have another order where params are no constants, and at creases any
 /// member of its limits is as good.
 #[test]

@@ -536,7 +536,8 @@ impl PySolid {
     /// prefix : str, optional
     ///     What all names begin with: the name of the solid.
     /// open_params : bool
-    ///     Whether the params of the file are arguments of the functions instead of constants.
+    ///     Whether the params of the file are arguments of the functions instead of constants. A ``UserWarning`` and the
+    ///     text name those that decide how the solid is built, and stay constants.
     #[pyo3(signature = (*, header=false, sign=false, distance=false, prefix=None, open_params=false))]
     fn to_c(
         &self,

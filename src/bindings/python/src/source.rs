@@ -1,6 +1,8 @@
 //! Solids as source text.
 
-use pyo3::exceptions::PyTypeError;
+use std::ffi::CString;
+
+use pyo3::exceptions::{PyTypeError, PyUserWarning};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use rfm::Solid;
@@ -37,7 +39,7 @@ impl Asked {
     }
 }
 
-/// The text of a solid of a program in a language.
+/// The text of a solid of a program in a language. Warns of params that were to stay open and cannot.
 ///
 /// # Errors
 /// `RfmError` if the language cannot hold a number of the formula, or if no name may begin with the prefix.
@@ -48,18 +50,33 @@ pub fn text(
     asked: Asked,
 ) -> PyResult<String> {
     let Asked { sign, distance, prefix, open_params } = asked;
-    let origin = vec![format!("Made by rfm {}, solid {}.", env!("CARGO_PKG_VERSION"), solid.name())];
-    let mut options = Options { prefix, sign, distance, origin, ..Options::default() };
+    let program = &program.bind(py).get().program;
+    let mut origin = vec![format!("Made by rfm {}, solid {}.", env!("CARGO_PKG_VERSION"), solid.name())];
+    let mut params = Vec::new();
     let mut solid = solid.clone();
+    let mut constants: Vec<&str> = program.params().iter().map(|param| &*param.name).collect();
+    let kept;
     if open_params {
-        let program = &program.bind(py).get().program;
-        let (opened, _) = program.with_open_params_of([solid.name()]).map_err(|error| raised(py, error))?;
-        let params = opened.module().params.iter();
-        options.params = params
+        let (opened, fixed) =
+            program.with_open_params_of([solid.name()]).map_err(|error| raised(py, error))?;
+        kept = source::kept_constant(solid.name(), &fixed);
+        constants.retain(|name| fixed.iter().any(|fixed| fixed == name));
+        let opened_params = opened.params().iter();
+        params = opened_params
             .map(|param| Param { name: param.name.clone(), value: param.value, doc: param.doc.clone() })
             .collect();
         solid =
             opened.solid_with(solid.name(), rfm::Engine::Interpreter).map_err(|error| raised(py, error))?;
+    } else {
+        kept = None;
     }
+    let values = program.params().iter().filter(|param| constants.contains(&&*param.name));
+    origin.extend(source::constants(values.map(|param| (&*param.name, param.value))));
+    if let Some(kept) = kept {
+        let message = CString::new(&*kept).map_err(refused)?;
+        PyErr::warn(py, &py.get_type::<PyUserWarning>(), &message, 1)?;
+        origin.push(format!("{kept}."));
+    }
+    let options = Options { prefix, sign, distance, params, origin, ..Options::default() };
     py.detach(|| source::write(&solid, target, &options)).map(|made| made.text).map_err(refused)
 }

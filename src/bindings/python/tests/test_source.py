@@ -45,6 +45,17 @@ def test_params_may_stay_open(pawn, tmp_path):
     assert made.p_omega(*at, params) == moved(1.2, 1.7, 0.5) != pawn(1.2, 1.7, 0.5)
 
 
+def test_params_that_stay_constants_are_told_of(recwarn):
+    program = rfm.load("rfm 1\nparam a = 0.5\nparam b = 2\nsolid s = sphere(b).scale(a)\nsolid row = sphere(a)")
+    assert " * Params: a = 0.5, b = 2.0.\n" in program["s"].to_c()
+    assert "Params:" not in program["row"].to_c(open_params=True)
+    assert not recwarn.list
+    with pytest.warns(UserWarning, match="^`a` decides how `s` is built and stays as in the file$") as warned:
+        text = program["s"].to_c(open_params=True)
+    assert warned[0].filename == __file__
+    assert " * Params: a = 0.5.\n * `a` decides how `s` is built and stays as in the file.\n" in text
+
+
 def test_texts_have_what_is_asked_for(pawn):
     assert "fn pawn_omega_gradient(p: vec3<f32>) -> vec4<f32> {" in pawn.to_wgsl()
     assert "float lady_sign(vec3 p) {" in pawn.to_glsl(prefix="lady", sign=True)
