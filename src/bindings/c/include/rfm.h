@@ -176,9 +176,9 @@ typedef struct RfmParam {
 } RfmParam;
 
 // The surface as seen from a point: accurate near a face, an estimate far away. Before an edge or a corner that stands
-// out the distance is that of the nearest face's plane: too small by up to 1 - sin(a/2) of it with the angle a of the
-// solid there, 29 % at a right angle, 42 % before the corner of a box. Inside, beside an edge that goes in, it may be too
-// long, by up to a half between two balls that overlap.
+// out the distance is that of the nearest face's plane: too small by up to 1 - sin(a/2) of it before an edge with the
+// angle a of the solid, 29 % at a right angle, more at an acute one; and by more before a corner, 42 % at that of a box.
+// Inside, beside an edge that goes in, it may be too long, by up to a half between two balls that overlap.
 typedef struct RfmContact {
     // Distance, m, positive outside.
     double distance;
