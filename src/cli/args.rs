@@ -331,8 +331,9 @@ pub(super) struct Build {
     /// Whose sin, exp and so on are called
     #[arg(long, value_enum, default_value_t = BuildMath::System)]
     pub math: BuildMath,
-    /// Keep the params of the file as arguments of the functions, in a structure, instead of constants: ω keeps its
-    /// bits, gradients may round differently
+    /// Keep the params of the file as arguments of the functions, in a structure, instead of constants. ω keeps its
+    /// bits unless a param is an angle by which the solid is turned; then its last ones may differ. Gradients may round
+    /// differently
     #[arg(long)]
     pub runtime_params: bool,
     /// The machine of an object file, as in x86_64-apple-darwin [default: this one, with all that its processor has]
