@@ -4,6 +4,7 @@
 //! |---|---|
 //! | `program`, `solid`, `mesh`, `slice`, `simulation` | one class of Python each |
 //! | `points`, `results`, `evaluate`, `path` | arguments as columns, new and given arrays, questions about many points |
+//! | `begin` | scenes at their start, and their probes |
 //! | `collision` | particles that are put back in arrays of the caller |
 //! | `source` | solids as source text |
 //! | `show` | what notebooks show |
@@ -12,6 +13,7 @@
 //!
 //! Invariant: no argument leads to a panic or to memory that is not the caller's. Errors are exceptions.
 
+mod begin;
 mod collision;
 mod error;
 mod evaluate;

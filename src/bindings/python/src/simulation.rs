@@ -9,15 +9,15 @@ use pyo3::exceptions::{PyBufferError, PyRuntimeError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::sync::PyOnceLock;
 use pyo3::types::{PyDict, PyTuple, PyType};
+use rfm::Experiment;
 use rfm::diagnostic::Diagnostics;
-use rfm::experiment::{Every, Start, probe_column};
-use rfm::mesh::Watch as _;
-use rfm::sph::{Checkpoint, Gauge, Simulation, StepError};
-use rfm::{Engine, Experiment, Program};
+use rfm::experiment::probe_column;
+use rfm::sph::{Checkpoint, Simulation, StepError};
 
-use crate::error::{diagnostics, not_read, raised, refused};
+use crate::begin::{Begun, Recorder, begin, recorders};
+use crate::error::{diagnostics, not_read, refused};
 use crate::mesh::write_file;
-use crate::pool::{LOOK, Threads, Watch, run, run_watched};
+use crate::pool::{LOOK, Threads, run, run_watched};
 use crate::program::PyProgram;
 use crate::show;
 use crate::state::{self, Lent};
@@ -80,56 +80,6 @@ struct State {
     lent: Lent,
 }
 
-/// A probe with the samples that it has taken.
-struct Recorder {
-    name: String,
-    gauge: Gauge,
-    clock: Every,
-    times: Vec<f64>,
-    /// One column for each figure of a sample.
-    figures: Vec<Vec<f64>>,
-}
-
-impl Recorder {
-    fn sample(&mut self, simulation: &Simulation) {
-        if !self.clock.is_due(simulation.time()) {
-            return;
-        }
-        self.times.push(simulation.time());
-        for (column, figure) in self.figures.iter_mut().zip(simulation.sample(&mut self.gauge)) {
-            column.push(figure);
-        }
-    }
-}
-
-/// The probes of a scene, sampled at the present instant.
-fn recorders(
-    experiment: &Experiment,
-    simulation: &mut Simulation,
-    resumed: Option<&Checkpoint>,
-) -> PyResult<Vec<Recorder>> {
-    let scene = experiment.scene();
-    let mut recorders = Vec::new();
-    for stated in &scene.probes {
-        let probe = stated.measured;
-        let gauge = match resumed {
-            Some(from) => {
-                let memory = from.get(&probe_column(&stated.name)).unwrap_or_default();
-                simulation.gauge_at(probe, from, memory)
-            }
-            None => simulation.gauge(probe),
-        };
-        let gauge = gauge.map_err(|error| refused(format!("probe `{}`: {error}", stated.name)))?;
-        let every = stated.every.unwrap_or(scene.run.save_every);
-        let begin = if resumed.is_some() { simulation.time() } else { -every };
-        let figures = vec![Vec::new(); probe.columns().len()];
-        let clock = Every::after(every, begin);
-        recorders.push(Recorder { name: stated.name.clone(), gauge, clock, times: Vec::new(), figures });
-    }
-    recorders.iter_mut().for_each(|recorder| recorder.sample(simulation));
-    Ok(recorders)
-}
-
 /// When steps end.
 #[derive(Clone, Copy)]
 enum Goal {
@@ -161,48 +111,6 @@ impl State {
             if started.elapsed() >= LOOK {
                 return ControlFlow::Continue(());
             }
-        }
-    }
-}
-
-/// A scene at its start.
-struct Begun {
-    experiment: Experiment,
-    at_start: Diagnostics,
-    simulation: Simulation,
-    recorders: Vec<Recorder>,
-}
-
-/// Fills a scene with particles. `None` if that is not wanted any more.
-///
-/// # Errors
-/// What is wrong with the scene, or its probes.
-fn begin(file: &Program, scene: &str, watch: &Watch) -> Result<Option<Begun>, NotBegun> {
-    let experiment = Experiment::new(file, scene, Engine::Auto).map_err(NotBegun::Scene)?;
-    if watch.is_over() {
-        return Ok(None);
-    }
-    let Start { mut simulation, warnings, .. } = experiment.start().map_err(NotBegun::Scene)?;
-    if watch.is_over() {
-        return Ok(None);
-    }
-    let mut at_start = experiment.warnings();
-    at_start.list.extend(warnings.list);
-    let recorders = recorders(&experiment, &mut simulation, None).map_err(NotBegun::Probe)?;
-    Ok(Some(Begun { experiment, at_start, simulation, recorders }))
-}
-
-/// Why a scene has no start.
-enum NotBegun {
-    Scene(rfm::Error),
-    Probe(PyErr),
-}
-
-impl NotBegun {
-    fn raised(self, py: Python<'_>) -> PyErr {
-        match self {
-            Self::Scene(error) => raised(py, error),
-            Self::Probe(error) => error,
         }
     }
 }
