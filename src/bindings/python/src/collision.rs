@@ -11,6 +11,7 @@ use rfm_columns::{Collisions, Column, Found, Obstacle, Particles, Vectors};
 
 use crate::evaluate::WORTH_THREADS;
 use crate::memory::{column, columns};
+use crate::points::refuse_masked;
 use crate::pool::{Threads, in_ranges};
 
 /// Vectors in the memory of arrays that may be written to.
@@ -91,8 +92,9 @@ fn one(given: &Bound<'_, PyAny>, name: &str) -> PyResult<(usize, Column<f64>)> {
     Ok((array.len(), column(array)))
 }
 
-/// Refuses an array that must not be changed.
+/// Refuses an array that must not be changed, or not all of it.
 fn check_writeable(array: &Bound<'_, PyAny>, name: &str) -> PyResult<()> {
+    refuse_masked(array)?;
     match array.getattr("flags")?.getattr("writeable")?.extract()? {
         true => Ok(()),
         false => {

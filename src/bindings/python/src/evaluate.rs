@@ -3,7 +3,8 @@
 use numpy::Element;
 use pyo3::prelude::*;
 use rfm::Solid;
-use rfm::solid::Chosen;
+use rfm::glam::DVec3;
+use rfm::solid::{Chosen, Distances};
 use rfm_columns::{Column, Job, Number};
 
 use crate::points::Points;
@@ -13,6 +14,50 @@ use crate::results::Target;
 /// From this number of points on, several threads are used unless the caller states a number.
 pub const WORTH_THREADS: usize = 4 * CHUNK;
 
+/// From this number of points on, several threads find clearances: each takes as long as ω at a thousand points.
+const WORTH_THREADS_PROVEN: usize = 128;
+
+/// Numbers that points have, as doubles and back.
+pub trait Rounded: Number + Element {
+    /// Itself.
+    fn wide(self) -> f64;
+
+    /// The nearest one.
+    fn nearest(value: f64) -> Self;
+
+    /// The greatest one that is not above a double.
+    fn below(value: f64) -> Self;
+}
+
+impl Rounded for f32 {
+    fn wide(self) -> f64 {
+        self.into()
+    }
+
+    fn nearest(value: f64) -> Self {
+        value as f32
+    }
+
+    fn below(value: f64) -> Self {
+        let nearest = value as f32;
+        if f64::from(nearest) > value { nearest.next_down() } else { nearest }
+    }
+}
+
+impl Rounded for f64 {
+    fn wide(self) -> f64 {
+        self
+    }
+
+    fn nearest(value: f64) -> Self {
+        value
+    }
+
+    fn below(value: f64) -> Self {
+        value
+    }
+}
+
 /// Calls `evaluate` for all points.
 fn over<T: Number + Element, const N: usize>(
     py: Python<'_>,
@@ -21,10 +66,21 @@ fn over<T: Number + Element, const N: usize>(
     threads: Threads,
     evaluate: impl Fn([&[T]; 3], [&mut [T]; N]) + Sync,
 ) -> PyResult<()> {
+    over_worth(py, points, results, (threads, WORTH_THREADS), evaluate)
+}
+
+/// Calls `evaluate` for all points, on several threads from a number of points on.
+fn over_worth<T: Number + Element, const N: usize>(
+    py: Python<'_>,
+    points: &Points<'_, T>,
+    results: [Option<Column<T>>; N],
+    (threads, worth_threads): (Threads, usize),
+    evaluate: impl Fn([&[T]; 3], [&mut [T]; N]) + Sync,
+) -> PyResult<()> {
     // SAFETY: `points` keeps its arrays, the callers below keep those of the results, and `Target` sees to it
     // that results share no address with the points or with one another
     let job = unsafe { Job::new(points.count, points.columns, results) };
-    in_ranges(py, threads, job.len(), WORTH_THREADS, |range| job.run(range, &evaluate))?;
+    in_ranges(py, threads, job.len(), worth_threads, |range| job.run(range, &evaluate))?;
     Ok(())
 }
 
@@ -124,6 +180,41 @@ impl<'py> Question<'_, 'py> {
     ) -> PyResult<()> {
         let solid = self.solid;
         over(self.py, points, results, self.threads, |points, out| solid.omega_grad_many(points, out))
+    }
+
+    /// The velocity of the surface near points. It is computed in double precision.
+    pub fn wall_velocity<T: Rounded>(
+        &self,
+        points: &Points<'py, T>,
+        out: Option<&Any<'py>>,
+    ) -> PyResult<Any<'py>> {
+        let velocity = Target::<T, 3>::new(self.py, points, out)?;
+        let solid = self.solid;
+        over(self.py, points, velocity.columns.map(Some), self.threads, |points, [x, y, z]| {
+            for i in 0..x.len() {
+                let found = solid.wall_velocity(DVec3::from_array(points.map(|column| column[i].wide())));
+                [x[i], y[i], z[i]] = found.to_array().map(T::nearest);
+            }
+        })?;
+        velocity.finished()
+    }
+
+    /// Distances that are proven at points. They are found in double precision.
+    pub fn clearance<T: Rounded>(
+        &self,
+        points: &Points<'py, T>,
+        out: Option<&Any<'py>>,
+    ) -> PyResult<Any<'py>> {
+        let clearance = Target::<T, 1>::new(self.py, points, out)?;
+        let distances = Distances::new(self.solid);
+        let (results, threads) = (clearance.columns.map(Some), (self.threads, WORTH_THREADS_PROVEN));
+        over_worth(self.py, points, results, threads, |points, [clearance]| {
+            for (i, clearance) in clearance.iter_mut().enumerate() {
+                let at = DVec3::from_array(points.map(|column| column[i].wide()));
+                *clearance = T::below(distances.at(at).clearance);
+            }
+        })?;
+        clearance.finished()
     }
 
     /// Distance, normal and mean curvature at points.

@@ -12,7 +12,7 @@ use rfm::Solid;
 use rfm::field::Entry;
 use rfm::glam::DVec3;
 
-use crate::points::numpy;
+use crate::points::{numpy, refuse_masked};
 use crate::pool::{Threads, in_ranges};
 
 /// From this number of paths on, several threads are used unless the caller states a number.
@@ -63,6 +63,7 @@ pub fn first_entry<'py>(
 
 /// An array of doubles.
 fn doubles<'py>(given: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyAny>> {
+    refuse_masked(given)?;
     let array = numpy(given.py())?.call_method1("asarray", (given,))?;
     let kind: String = array.getattr("dtype")?.getattr("kind")?.extract()?;
     if !["f", "i", "u", "b"].contains(&&*kind) {

@@ -3,7 +3,8 @@
 use std::ops::Range;
 
 use numpy::ndarray::{Ix1, Ix2};
-use numpy::{Element, PyArray, PyUntypedArrayMethods};
+use numpy::{Element, PyArray, PyUntypedArray, PyUntypedArrayMethods};
+use pyo3::PyTypeInfo;
 use pyo3::exceptions::{PyTypeError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::sync::PyOnceLock;
@@ -54,6 +55,7 @@ impl<'py> Given<'py> {
         y: Option<&Bound<'py, PyAny>>,
         z: Option<&Bound<'py, PyAny>>,
     ) -> PyResult<Self> {
+        [Some(points), y, z].into_iter().flatten().try_for_each(refuse_masked)?;
         match (y, z) {
             (None, None) => {
                 if let Some(points) = rows(points) {
@@ -80,6 +82,24 @@ impl<'py> Given<'py> {
 /// Whether this is a number of Python itself; numbers of NumPy that are doubles count too.
 fn is_number(given: &Bound<'_, PyAny>) -> bool {
     given.is_instance_of::<PyFloat>() || given.is_instance_of::<PyInt>()
+}
+
+/// Refuses an array some of whose elements are masked: its memory has numbers for them that mean nothing.
+///
+/// # Errors
+/// `ValueError` for such an array.
+pub fn refuse_masked(given: &Bound<'_, PyAny>) -> PyResult<()> {
+    let py = given.py();
+    if given.get_type().is(PyUntypedArray::type_object(py)) || is_number(given) {
+        return Ok(()); // nearly all, at the price of a comparison
+    }
+    match numpy(py)?.getattr("ma")?.call_method1("is_masked", (given,))?.is_truthy()? {
+        true => Err(PyValueError::new_err(
+            "the array has masked elements: leave them out, as `array.compressed()` does, or give them a value, as \
+             `array.filled(numpy.nan)` does",
+        )),
+        false => Ok(()),
+    }
 }
 
 /// The module `numpy`.

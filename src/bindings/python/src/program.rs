@@ -35,7 +35,8 @@ const TEXT: &str = "<text>";
 ///     The path of the file for which a text stands: the text may name other files in its folder and below, and messages
 ///     show it. The file itself is not read. Positional only, because params may be called so.
 /// **params : float or str
-///     Values for params of the file: numbers in SI units, or texts with a unit such as ``"8 mm"``.
+///     Values for params of the file: numbers in SI units, or texts with a unit such as ``"8 mm"``. The unit must fit the
+///     one that the file writes the param in; a param that it writes without a unit takes any, as ``rfm -D`` does.
 ///
 /// Returns
 /// -------
@@ -55,6 +56,11 @@ pub fn load(
     path: Option<PathBuf>,
     params: Option<&Bound<'_, PyDict>>,
 ) -> PyResult<PyProgram> {
+    if path_or_text.is_instance_of::<PyBytes>() {
+        return Err(PyTypeError::new_err(
+            "the first argument is bytes, expected a str: `text.decode()` for a text, `os.fsdecode(path)` for a path",
+        ));
+    }
     let source = match (path_or_text.cast::<PyString>(), path) {
         (Ok(text), path) if is_text(&text.to_cow()?) => {
             let name = path.map_or(TEXT.to_string(), |path| path.display().to_string());
@@ -107,7 +113,8 @@ fn given(params: Option<&Bound<'_, PyDict>>) -> PyResult<Vec<Given>> {
 /// A checked file: its solids and its scenes. `load` makes one.
 ///
 /// ``program["pawn"]`` is a solid, compiled when it is first asked for. ``in``, ``len`` and iteration are about
-/// the names of solids.
+/// the names of solids. A name that the file does not have is a ``KeyError`` here, as in any mapping, and an `RfmError`
+/// in `solid` and `scene`.
 #[pyclass(frozen, mapping, module = "rfm", name = "Program")]
 pub struct PyProgram {
     pub program: Program,
@@ -153,6 +160,10 @@ impl PyProgram {
         }
         let solid = py.detach(|| self.program.solid(name)).map_err(|error| raised(py, error))?;
         Ok(solids().entry(name.to_string()).or_insert(solid).clone())
+    }
+
+    fn has(&self, solid: &str) -> bool {
+        self.program.solids().any(|name| name == solid)
     }
 
     fn source(&self) -> Option<&Source> {
@@ -227,7 +238,7 @@ impl PyProgram {
     }
 
     fn __getitem__(slf: &Bound<'_, Self>, name: &str) -> PyResult<PySolid> {
-        if !slf.get().__contains__(name) {
+        if !slf.get().has(name) {
             let known = slf.get().program.module().solids.iter().map(|solid| solid.name.clone()).collect();
             let unknown = Error::UnknownName { kind: "solid", name: name.into(), known };
             return Err(PyKeyError::new_err(unknown.to_string()));
@@ -235,8 +246,9 @@ impl PyProgram {
         Self::solid(slf, Some(name))
     }
 
-    fn __contains__(&self, name: &str) -> bool {
-        self.program.module().solids.iter().any(|solid| solid.name == name)
+    /// Whether a solid has this name; what is no text is none.
+    fn __contains__(&self, name: &Bound<'_, PyAny>) -> bool {
+        name.cast::<PyString>().is_ok_and(|name| name.to_cow().is_ok_and(|name| self.has(&name)))
     }
 
     fn __len__(&self) -> usize {

@@ -30,6 +30,7 @@ def test_mistakes_in_a_file_have_places():
         (lambda: rfm.load("no/such.rfm"), FileNotFoundError, "no/such.rfm"),
         (lambda: rfm.load(EXAMPLES), IsADirectoryError, "examples"),
         (lambda: rfm.load(3), TypeError, None),
+        (lambda: rfm.load(b"rfm 1\nsolid a = sphere(1)"), TypeError, r"`text\.decode\(\)`"),
         (lambda: rfm.load("rfm 1\nparam a = 1 in 0 .. 2", a=3), rfm.RfmError, "param"),
         (lambda: rfm.load("rfm 1\nparam a = 1", b=3), rfm.RfmError, "no param `b`|`b`"),
         (lambda: rfm.load("rfm 1\nparam a = 1", a="x"), ValueError, "param `a`"),
@@ -52,6 +53,33 @@ def test_mistakes_in_a_file_have_places():
 def test_bad_files_params_and_names(wrong, error, words):
     with pytest.raises(error, match=words):
         wrong()
+
+
+def test_a_program_has_only_names():
+    program = rfm.load("rfm 1\nsolid a = sphere(1)")
+    assert "a" in program and "b" not in program
+    assert not any(other in program for other in (3, None, b"a", ["a"]))
+
+
+def test_a_param_without_a_unit_takes_any():
+    assert rfm.load("rfm 1\nparam a = 1\nsolid s = sphere(a)", a="8 kg").params["a"].value == 8.0
+
+
+def test_masked_elements_are_refused():
+    ball = rfm.load("rfm 1\nsolid s = sphere(1)")["s"]
+    whole = np.ma.masked_array(np.zeros((3, 3)))
+    assert (ball.omega(whole) == ball(0.0, 0.0, 0.0)).all()
+    masked = np.ma.masked_array(np.zeros((3, 3)), mask=np.eye(3))
+    column = masked[:, 0]
+    for question in (
+        lambda: ball.omega(masked),
+        lambda: ball.contact(column, 0.0, 0.0),
+        lambda: ball.first_entry(masked, np.ones((3, 3))),
+        lambda: ball.collide(masked, np.zeros((3, 3)), reach=1.0),
+        lambda: ball.collide(np.zeros((3, 3)), masked, reach=1.0),
+    ):
+        with pytest.raises(ValueError, match="masked elements"):
+            question()
 
 
 def test_a_text_names_other_files_if_it_stands_for_one(tmp_path):

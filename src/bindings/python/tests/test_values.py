@@ -244,6 +244,24 @@ def test_a_moving_solid_is_seen_at_a_time():
     assert not rfm.load(EXAMPLES / "pawn.rfm")["pawn"].moves
 
 
+@pytest.mark.parametrize("dtype", ["f8", "f4"])
+def test_velocities_and_clearances_are_those_at_single_points(dtype):
+    wheel = rfm.load("rfm 1\nsolid wheel = box([-1, -1, 0], [1, 1, 1]).rotate_z(2*t).move([3*t, 0, 0])")["wheel"].at(0.5)
+    points = RNG.uniform(-1, 3, (300, 3)).astype(dtype)
+    found = wheel.wall_velocity(points)
+    assert found.dtype == dtype and same(found, wheel.wall_velocity(*points.T, threads=2))
+    x, y = points[:, 0], points[:, 1]
+    assert np.allclose(found, np.stack([3 - 2 * y, 2 * (x - 1.5), 0 * x], axis=-1), atol=1e-5)
+    assert (rfm.load("rfm 1\nsolid s = sphere(1)")["s"].wall_velocity(1, 0, 0) == 0).all()
+    ball = rfm.load("rfm 1\nsolid s = sphere(1)")["s"]
+    out = np.empty(300, dtype)
+    assert ball.clearance(points, out=out) is out
+    distance = np.abs(np.linalg.norm(points.astype("f8"), axis=1) - 1)
+    assert (out <= distance).all() and (out > distance * 0.99 - 1e-6).all()
+    assert ball.clearance(*points[0].tolist()) == pytest.approx(out[0], rel=1e-6)
+    assert np.isnan(ball.clearance(np.nan, 0, 0))
+
+
 def test_a_stated_number_of_threads_costs_next_to_nothing(pawn):
     def seconds(**threads):
         runs = timeit.repeat(lambda: pawn.omega(1.5, 1.5, 0.5, **threads), number=1000, repeat=7)
