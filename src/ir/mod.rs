@@ -9,6 +9,7 @@
 //! | `graph`, `op`, `function`, `r0`, `form` | the graph, its operations, the forms in which R₀ is computed |
 //! | `lookup` | fields that are looked up in a table |
 //! | `interpreter` | the meaning of a graph |
+//! | `parametrised` | a graph whose constants are parameters |
 //! | `derived` | graphs made of a graph: gradient, contact, sign twin, what depends on time alone; and its rigid motion |
 //! | `bounds` | ranges, magnitudes and rounding errors over boxes |
 //! | `contraction` | boxes made smaller around the points at which a formula is positive |
@@ -31,6 +32,7 @@ mod interpreter;
 mod lookup;
 mod on_path;
 mod op;
+mod parametrised;
 pub mod r0;
 mod real;
 

@@ -99,13 +99,11 @@ impl Lowering<'_> {
         let margin = rounding(corners);
         let (x, y) = (self.module.graph.coordinate(Axis::X), self.module.graph.coordinate(Axis::Y));
         let (sum, difference) = (self.binary(Binary::Add, x, y, span), self.binary(Binary::Sub, x, y, span));
-        let along: [(Node, fn(&Point) -> f64); 4] =
-            [(x, |p| p[0]), (y, |p| p[1]), (sum, |p| p[0] + p[1]), (difference, |p| p[0] - p[1])];
-        let sides = along.map(|(along, of)| {
-            let [least, most] = corners
-                .iter()
-                .map(of)
-                .fold([f64::INFINITY, f64::NEG_INFINITY], |[lo, hi], value| [lo.min(value), hi.max(value)]);
+        let along = [(x, [1.0, 0.0]), (y, [0.0, 1.0]), (sum, [1.0, 1.0]), (difference, [1.0, -1.0])];
+        let sides = along.map(|(along, [a, b])| {
+            let places = corners.iter().map(|p| a * p[0] + b * p[1]);
+            let [least, most] = places
+                .fold([f64::INFINITY, f64::NEG_INFINITY], |[lo, hi], place| [lo.min(place), hi.max(place)]);
             let [least, most] = [least - margin, most + margin].map(|end| self.constant(end));
             [self.binary(Binary::Sub, along, least, span), self.binary(Binary::Sub, most, along, span)]
         });
@@ -193,7 +191,8 @@ fn rounding(corners: &[Point]) -> f64 {
         if turns_back { sine } else { 1.0 }
     };
     let narrowest = (1..corners.len()).map(narrowest).fold(1.0, f64::min);
-    16.0 * f64::EPSILON * size / narrowest.max(STRAIGHT)
+    // sums and differences of two coordinates are farther off than each of them
+    32.0 * f64::EPSILON * size / narrowest.max(STRAIGHT)
 }
 
 /// Twice the area of the triangle a b c, positive if it runs counter-clockwise; 0 if its corners lie on a line but for

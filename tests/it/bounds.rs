@@ -287,7 +287,7 @@ fn bounded() -> impl Strategy<Value = String> {
 fn blade(teeth: usize) -> String {
     let corner = |k: usize| {
         let (sin, cos) = (std::f64::consts::PI * k as f64 / teeth as f64).sin_cos();
-        let radius = if k % 2 == 0 { 1.0 } else { 0.6 };
+        let radius = if k.is_multiple_of(2) { 1.0 } else { 0.6 };
         format!("[{:.6}, {:.6}]", radius * cos, radius * sin)
     };
     format!("polygon([{}])", (0..2 * teeth).map(corner).collect::<Vec<_>>().join(", "))

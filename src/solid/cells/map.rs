@@ -24,6 +24,7 @@ use crate::interval::Interval;
 use crate::ir::Unary;
 use crate::solid::construction::Solid;
 use crate::solid::evaluation::Contact;
+use crate::solid::leaves::known_ranges::KnownRanges;
 use crate::solid::leaves::leaf_set::{LeafTree, Leaves};
 use crate::solid::leaves::pruning::Verdict;
 use crate::solid::leaves::words::Word;
@@ -485,31 +486,33 @@ impl CellMap {
         if !self.is_within(over) {
             return None;
         }
-        let (mut all, mut last): (Option<Interval>, _) = (None, None);
-        let of_cell = &mut |cell: Known<'_>, depth: u32| {
-            // what stands for ω where only its sign is known
-            let free = self.cells.shortest_side(depth);
-            let range = match cell {
-                Known::Fluid => Interval::point(-free),
-                Known::Inside => Interval::point(free),
-                // cells beside each other often share their words
-                Known::Near(words) if last == Some(words.as_ptr()) => return ControlFlow::Continue(()),
-                Known::Near(words) => {
-                    last = Some(words.as_ptr());
-                    self.parts.leaves.range_of_tree(words, &mut 0, over)
+        KnownRanges::with(self.parts.leaves.len(), |known| {
+            let (mut all, mut last): (Option<Interval>, _) = (None, None);
+            let of_cell = &mut |cell: Known<'_>, depth: u32| {
+                // what stands for ω where only its sign is known
+                let free = self.cells.shortest_side(depth);
+                let range = match cell {
+                    Known::Fluid => Interval::point(-free),
+                    Known::Inside => Interval::point(free),
+                    // cells beside each other often share their words
+                    Known::Near(words) if last == Some(words.as_ptr()) => return ControlFlow::Continue(()),
+                    Known::Near(words) => {
+                        last = Some(words.as_ptr());
+                        self.parts.leaves.range_of_tree(words, &mut 0, over, known)
+                    }
+                };
+                let hull = all.map_or(range, |all| all.hull(range));
+                all = Some(hull);
+                if hull.lo <= 0.0 && hull.hi > 0.0 {
+                    return ControlFlow::Break(());
                 }
+                ControlFlow::Continue(())
             };
-            let hull = all.map_or(range, |all| all.hull(range));
-            all = Some(hull);
-            if hull.lo <= 0.0 && hull.hi > 0.0 {
-                return ControlFlow::Break(());
+            match self.cells.visit(over, MOST_TOUCHED, of_cell)? {
+                ControlFlow::Break(()) => Some(Interval::ALL),
+                ControlFlow::Continue(()) => all,
             }
-            ControlFlow::Continue(())
-        };
-        match self.cells.visit(over, MOST_TOUCHED, of_cell)? {
-            ControlFlow::Break(()) => Some(Interval::ALL),
-            ControlFlow::Continue(()) => all,
-        }
+        })
     }
 }
 

@@ -9,6 +9,7 @@ use glam::DVec3;
 
 use smallvec::SmallVec;
 
+use super::known_ranges::KnownRanges;
 use super::pruning::{Verdict, prune};
 use super::shape::{Demand, Motion, Shape, SlopeProgram};
 use super::tree::LeafNode;
@@ -257,21 +258,27 @@ impl Leaves {
     }
 
     /// An interval that contains the value of a tree in prefix form at every point of a box, at all times of
-    /// the stretch; all numbers if a leaf may be NaN. `at` is moved past the tree.
-    pub fn range_of_tree(&self, words: &[u32], at: &mut usize, over: &Aabb) -> Interval {
+    /// the stretch; all numbers if a leaf may be NaN. `at` is moved past the tree; `known` are ranges over the same box.
+    pub fn range_of_tree(
+        &self,
+        words: &[u32],
+        at: &mut usize,
+        over: &Aabb,
+        known: &mut KnownRanges,
+    ) -> Interval {
         let word = Word::read(words[*at]);
         *at += 1;
         let (parts, all) = match word {
             Word::Leaf { leaf, negated } => {
-                let range = self.range_among_many(leaf, over);
+                let range = known.of(leaf, || self.range_among_many(leaf, over));
                 return if negated { -range } else { range };
             }
             Word::All(parts) => (parts, true),
             Word::Any(parts) => (parts, false),
         };
-        let mut range = self.range_of_tree(words, at, over);
+        let mut range = self.range_of_tree(words, at, over, known);
         for _ in 1..parts {
-            let next = self.range_of_tree(words, at, over);
+            let next = self.range_of_tree(words, at, over, known);
             range = match (range == Interval::ALL || next == Interval::ALL, all) {
                 (true, _) => Interval::ALL,
                 (false, true) => range.min(next),

@@ -1,6 +1,7 @@
 //! A solid taken apart into leaves: how they are joined, what each of them is, what is left of them in a box.
 
 mod faces;
+pub mod known_ranges;
 pub mod leaf_set;
 mod pieces;
 pub mod pruning;
