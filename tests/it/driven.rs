@@ -495,11 +495,11 @@ scene drag {
 /// A gravity that depends on the place gives the speed of a fall where the fluid is.
 #[test]
 fn a_gravity_of_the_place_is_expected() {
-    let speed = |gravity: &str| {
+    let speed = |gravity: &str, height: f64| {
         let text = format!(
             "rfm 1
 scene s {{
-  box {{ max: [1, 1, 1] }}
+  box {{ max: [1, 1, {height}] }}
   fluid water {{ shape: z <= 0.3, density: 1000, spacing: 0.1 }}
   gravity: {gravity}
   run {{ until: 1 s }}
@@ -508,12 +508,15 @@ scene s {{
         let program = Program::from_source("s.rfm", text).unwrap();
         Experiment::new(&program, "s", Engine::Auto).unwrap().typical_speed()
     };
-    let still = speed("[0, 0, -9.81]");
-    assert!((speed("[0*x, 0, -9.81]") - still).abs() < 1e-9);
+    let still = speed("[0, 0, -9.81]", 0.6);
+    assert!((still - (2.0 * 9.81 * 0.6_f64).sqrt()).abs() < 1e-9);
+    assert!((speed("[0*x, 0, -9.81]", 0.6) - still).abs() < 1e-9);
+    // from twice the height of the fluid, where the box is higher than that
+    assert!((speed("[0, 0, -9.81]", 20.0) - still).abs() < 1e-3 * still);
     // 4 m/s² at x = 1, and 9.81 m/s² downwards
-    assert!((speed("[4*x, 0, -9.81]") - (2.0 * 13.81_f64).sqrt()).abs() < 1e-9);
+    assert!((speed("[4*x, 0, -9.81]", 1.0) - (2.0 * 13.81_f64).sqrt()).abs() < 1e-9);
     // a pole above the fluid does not count
-    assert!(speed("[0, 0, -1/(0.8 - z)^2]") < (2.0 / 0.25_f64).sqrt() + 1e-9);
+    assert!(speed("[0, 0, -1/(0.8 - z)^2]", 1.0) < (2.0 / 0.25_f64).sqrt() + 1e-9);
 }
 
 /// A gravity that ceases to have a value is named, whether it depends on the time or on the place.

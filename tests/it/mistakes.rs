@@ -177,7 +177,6 @@ const SHAPES: &[&str] = &[
     "solid s = box().repeat([0, 1, 1], [2, 1, 1])",
     "param n = 0 in 0 .. 9\nsolid s = sphere(1).polar_repeat(n)",
     "solid s = sphere(1).polar_repeat(2.5)",
-    "fn ring(n) = sphere(1).polar_repeat(n)\nsolid s = ring(1)",
     "solid s = any i in 0..3: any j in 0..i: ball([i, j, 0], 1)",
     "solid s = sphere(1) or box() or sphere(1)",
     "solid s = sphere(1) or box() or sphere(1) or box()",
