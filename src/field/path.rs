@@ -25,9 +25,8 @@ pub struct Entry {
     pub t: f64,
     /// The path may be in the obstacle between `t` and this part of it. After it comes a part that is not.
     pub until: f64,
-    /// Whether some point between `t` and `until` is surely not in the fluid, within 1e-7 of the path behind `t`. If
-    /// not, the path grazes the surface within the rounding errors of the formula, or the search has spent its
-    /// budget.
+    /// Whether some point between `t` and `until` is surely not in the fluid. If not, the path grazes the
+    /// surface within the rounding errors of the formula, or the search has spent its budget.
     pub certain: bool,
     /// The place at `t`.
     pub point: DVec3,

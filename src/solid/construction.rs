@@ -40,6 +40,7 @@ pub(super) struct Inner {
     parts: OnceLock<Option<LeavesAtAllTimes>>,
     /// ω with what encloses its parts, if anything does.
     with_hulls: Option<(Graph, Node)>,
+    parts_with_hulls: OnceLock<Option<LeavesAtAllTimes>>,
     applied: Applied,
 }
 
@@ -140,6 +141,7 @@ impl Solid {
             motion: OnceLock::new(),
             parts: OnceLock::new(),
             with_hulls,
+            parts_with_hulls: OnceLock::new(),
             applied,
         };
         let solid = Self { inner: Arc::new(inner), moment: Moment::new(0.0, 0.0) };
@@ -305,7 +307,10 @@ impl Solid {
     /// The solid taken apart into leaves and what encloses them, to find its bounds; `None` if that would be too large.
     pub(super) fn parts_with_hulls(&self) -> Option<Arc<LeafTree>> {
         let Some((graph, root)) = &self.inner.with_hulls else { return self.parts() };
-        let (store, words) = self.inner.taken_apart(graph, *root)?;
+        let parts = &self.inner.parts_with_hulls;
+        let taken_apart = parts.get_or_init(|| self.inner.taken_apart(graph, *root)).clone();
+        // with the hulls it may be too large, and not without them
+        let Some((store, words)) = taken_apart else { return self.parts() };
         let Moment { from, to, .. } = *self.moment;
         Some(Arc::new(LeafTree { leaves: store.during(from, to), words }))
     }

@@ -33,8 +33,8 @@ const MOST_HALVINGS: u32 = 32;
 /// Leaves whose distances from the entry differ by less than this part of the path decide together.
 const TOGETHER: f64 = 1e-9;
 
-/// An entry is certain if a point that is surely not in the fluid follows within this part of the path: where the search
-/// has spent its budget, the path may be known to meet the solid, but not where.
+/// A search that has spent its budget has found the entry if a point that is surely not in the fluid follows within this
+/// part of the path. Otherwise the path may be known to meet the solid, but not where.
 const SOON: f64 = 1e-7;
 
 /// A path through the leaves of a solid.
@@ -71,9 +71,10 @@ impl<'a> Sweep<'a> {
         }
         let met = self.stretches(words, &mut 0, within);
         let (t, until) = met.possible.iter().next()?;
-        let certain = !met.certain.within((t, until.min(t + SOON))).is_empty();
+        let certain = !met.certain.within((t, until)).is_empty();
+        let is_found = !met.certain.within((t, until.min(t + SOON))).is_empty();
         let halvings = self.halvings.get();
-        if !certain && until - t > SOON && self.enclosures.get() == 0 && halvings > 0 {
+        if !is_found && until - t > SOON && self.enclosures.get() == 0 && halvings > 0 {
             self.halvings.set(halvings - 1);
             let middle = 0.5 * (t + until);
             if let Some(entry) = self.search_anew(words, (t, middle)) {
