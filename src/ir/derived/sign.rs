@@ -14,7 +14,8 @@ const MOST_NODES: usize = 48;
 /// Where a factor that varies has to be positive: the sign of a solid is asked nowhere else.
 const FARTHEST: f64 = 2e77;
 
-/// A factor that varies lies between these bounds, so that products are 0 nowhere but where the other factor is.
+/// A factor that varies lies between these bounds, so that products are 0 nowhere but where the other factor is, or is
+/// below 1e-299. The proof is for double precision: in single precision a small factor may round to 0.
 const FACTORS: Interval = Interval { lo: 1e-9, hi: 1e9 };
 
 /// How the sign of a node follows from its operands.
@@ -90,7 +91,7 @@ fn varies_above_zero(graph: &Graph, node: Node) -> bool {
     let (mut next, mut is_bounded) = (0, false);
     while let Some(&node) = seen.get(next) {
         let expr = graph.expr(node);
-        // without one of these a formula is as large as its coordinates
+        // most formulas without one of these are as large as their coordinates
         is_bounded |=
             matches!(expr, Expr::Unary(Unary::Call(_), _) | Expr::Binary(Binary::Min | Binary::Max, ..));
         if matches!(expr, Expr::Parameter(_) | Expr::Uniform(_) | Expr::Lookup(..)) || seen.len() > MOST_NODES

@@ -34,7 +34,7 @@ impl Logic {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct LeafNode {
     pub node: Node,
-    /// The product of the positive factors between the root and the leaf, where it is met first.
+    /// The product of the positive constant factors between the root and the leaf, where it is met first.
     pub factor: f64,
 }
 
