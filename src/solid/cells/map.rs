@@ -127,7 +127,7 @@ impl CellMap {
         }
         let parts = solid.parts()?;
         let margin = margin(&domain, reach);
-        let cells = Cells::new(&parts, domain, margin);
+        let cells = Cells::new(&parts, domain, margin, reach);
         Self::of(solid, Arc::new(Window::at_rest(cells, parts, margin)), reach)
     }
 
