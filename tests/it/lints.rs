@@ -65,6 +65,9 @@ fn operands_are_idle_by_all_of_the_formula() {
     assert_eq!(idle("sphere(1) and (sphere(2) and sphere(1.5) or x <= -5)").len(), 1);
     assert_eq!(idle("sphere(2) and (x <= 3 or y <= 3)"), ["(x <= 3 or y <= 3)"]);
     assert_eq!(idle("box([0, 0, 0], [1, 1, 1]) and x <= 1.5"), ["x <= 1.5"]);
+    // a wall that it shares with another cylinder is no operand of its own, and neither is what is left of it
+    let shared = "((cylinder(0.5, 1) or sphere(1)) \\ cylinder(0.5, 4).move([0, 0, -2])).scale(0.37)";
+    assert!(idle(shared).is_empty(), "{:?}", idle(shared));
     // what only touches, members of a fold, and parts of a standard solid are left alone
     for text in [
         "box([0, 0, 0], [1, 1, 1]) and x <= 1",

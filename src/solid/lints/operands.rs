@@ -84,7 +84,7 @@ impl Operands {
     pub fn of(graph: &Graph, root: Node) -> Option<Self> {
         let (_, nodes) = Logic::of(graph, root)?;
         let leaves = nodes.iter().enumerate().map(|(i, leaf)| (leaf.node, i as u32)).collect();
-        let mut reader = Reader { graph, leaves, all: Vec::new() };
+        let mut reader = Reader { graph, leaves, all: Vec::new(), joins: Vec::new() };
         reader.read(root, None, 0)?;
         Some(Self { all: reader.all, leaves: nodes.len() })
     }
@@ -150,6 +150,8 @@ struct Reader<'g> {
     graph: &'g Graph,
     leaves: HashMap<Node, u32>,
     all: Vec<Operand>,
+    /// The place of each operand's own `and` or `or`, without factors and negations around it.
+    joins: Vec<Option<Span>>,
 }
 
 impl Reader<'_> {
@@ -172,9 +174,13 @@ impl Reader<'_> {
         }
         let number = self.all.len();
         // the `not` of `a \ b` is written nowhere: it has the place of the whole
-        let outer = joined.and_then(|(parent, _)| self.all[parent].span);
-        let span = self.graph.span(root).filter(|span| Some(*span) != outer).or(self.graph.span(node));
+        let whole = |span: &Span| {
+            joined.is_some_and(|(at, _)| [self.all[at].span, self.joins[at]].contains(&Some(*span)))
+        };
+        let own = self.graph.span(node);
+        let span = self.graph.span(root).filter(|span| !whole(span)).or(own);
         let leaf = self.leaves.get(&node).copied().unwrap_or(0);
+        self.joins.push(own);
         self.all.push(Operand { kind: Kind::Leaf { leaf, negated }, span, joined, factor });
         let (a, b, is_all) = match rule {
             SignRule::All(a, b) => (a, b, !negated),
