@@ -1,6 +1,7 @@
 //! The divergence-free method: its numbers, keys and limits. The scheme is in [`scheme`].
 
 mod ahead;
+mod arrest;
 mod passes;
 mod rigid;
 mod scheme;

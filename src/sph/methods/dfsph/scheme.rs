@@ -7,6 +7,7 @@
 //! D ← D + dt·(the part of dρ/dt that the solver left)
 //! v ← v + ½·dt·(g + a(s̄))
 //! x ← x + dt·v + b(s′)     s′ ≥ 0 so that ρ ≤ ρ₀ at the new place
+//! v ← v + the part of b(s′)/dt that undoes this motion
 //! ```
 //!
 //! with the lower of the last pressure and its mean as s̄ ([`Ahead`]): the fluid follows its curved paths to second order.
@@ -19,7 +20,8 @@
 //! correct it. A column could sink endlessly within the tolerance while displacements lift it (a breaking dam
 //! gained 8 % of its energy in this way). So each particle remembers the error as a debt D of density, and
 //! the pressure pays it back within τ (Baumgarte 1972). The tolerance of this solve is that of the density
-//! over τ. A part of the density that displacements take away is added to the debt, see [`OWED`].
+//! over τ. A part of the density that displacements take away is added to the debt, see [`OWED`]. Velocities that
+//! displacements undo are taken away, see [`Arrest`].
 //!
 //! Both systems count the part of the kernel that is missing before a free surface as fluid
 //! ([`free_surface`](super::super::free_surface)), so that the outermost particles keep the same distance as
@@ -74,6 +76,7 @@ use super::super::{
     viscosity::SpinViscosity,
 };
 use super::ahead::Ahead;
+use super::arrest::Arrest;
 use super::passes::{Constants, Continuation, Densities, Drag};
 use super::rigid::Rigid;
 use super::solver::{Begin, Errors, Goal, RateOf, Solver};
@@ -136,6 +139,7 @@ pub struct DivergenceFree {
     pub(super) own_pressure: Vec<f64>,
     /// What the last step gave of pressure in advance.
     ahead: Ahead,
+    arrest: Arrest,
     /// Stiffness of a lattice of these particles, see [`Wendland::lattice_stiffness`].
     stiffness: f64,
     /// G = −⅓ Σ V r·∇W + ⅓ tr K of each particle.
@@ -199,7 +203,10 @@ impl Scheme for DivergenceFree {
             self.ahead.hold_back(core, dt);
         }
         self.keep_density(core, dt);
-        self.find_displacements(core, dt, OWED);
+        if self.find_displacements(core, dt, OWED) {
+            self.arrest.find(core, (&self.places, &self.walls), &self.free, &self.loaded);
+            self.arrest.take(core, &self.walls, dt, &mut self.displacement);
+        }
         core.move_obstacles(dt);
         core.drift(dt, Some((&self.displacement, 1.0 / dt)))?;
         self.settle(core, &mut []);
@@ -252,6 +259,7 @@ impl Scheme for DivergenceFree {
             + self.roughness.bytes()
             + self.walls.bytes()
             + self.ahead.bytes()
+            + self.arrest.bytes()
     }
 
     fn iterations(&self) -> Option<u32> {
@@ -282,6 +290,7 @@ impl DivergenceFree {
             debt: vec![0.0; n],
             own_pressure: vec![0.0; n],
             ahead: Ahead::nothing(n),
+            arrest: Arrest::default(),
             stiffness: 0.0,
             spread: vec![0.0; n],
             crowding: Vectors::default(),
@@ -453,8 +462,8 @@ impl DivergenceFree {
 
     /// Finds the displacements of a step of the length dt: those by shifting, and those that keep densities
     /// at the new places from exceeding the rest density. The part `owed` of the density that the latter take
-    /// away becomes a debt. The velocities are those in `drift`.
-    pub(super) fn find_displacements(&mut self, core: &Core, dt: f64, owed: f64) {
+    /// away becomes a debt. The velocities are those in `drift`. Returns whether densities had to be kept.
+    pub(super) fn find_displacements(&mut self, core: &Core, dt: f64, owed: f64) -> bool {
         if let Some((crowding, factor)) = shift(self.numbers.shifting, &self.crowding, core) {
             add_scaled(&mut self.drift, crowding, factor);
         }
@@ -467,7 +476,8 @@ impl DivergenceFree {
             Goal { tolerance: self.numbers.tolerance * rest, most_iterations: self.numbers.most_iterations };
         let mut errors = Errors::default();
         self.free.iter().for_each(|excess| errors.count(excess.max(0.0), goal));
-        if errors.reach(goal, self.free.len()) {
+        let is_kept = errors.reach(goal, self.free.len());
+        if is_kept {
             self.displacement.resize(self.free.len());
             self.displacement.components_mut().into_iter().for_each(|column| column.fill(0.0));
         } else {
@@ -481,6 +491,7 @@ impl DivergenceFree {
         if let Some((crowding, factor)) = shift(self.numbers.shifting, &self.crowding, core) {
             add_scaled(&mut self.displacement, crowding, factor * dt);
         }
+        !is_kept
     }
 }
 
