@@ -299,6 +299,21 @@ impl BinaryFunction {
                 let hi = corners.into_iter().fold(f64::NEG_INFINITY, f64::max);
                 Interval::new(lo, hi).widened(4)
             }
+            // a fixed power, which grows with |a|
+            Self::Pow if b.lo == b.hi && b.lo > 0.0 && (b.lo.fract() == 0.0 || a.lo >= 0.0) => {
+                let at = |a: f64| libm::pow(a, b.lo);
+                let is_even = b.lo % 2.0 == 0.0;
+                let range = if is_even && a.contains(0.0) {
+                    Interval::new(0.0, at(a.lo).max(at(a.hi)))
+                } else if is_even {
+                    // a is negative
+                    Interval::new(at(a.hi), at(a.lo))
+                } else {
+                    Interval::new(at(a.lo), at(a.hi))
+                };
+                let widened = range.widened(4);
+                if range.lo >= 0.0 { Interval { lo: widened.lo.max(0.0), ..widened } } else { widened }
+            }
             Self::Pow => Interval::ALL,
             // around the origin, and at the cut behind it
             Self::Atan2 if a.contains(0.0) && b.lo <= 0.0 => {
@@ -328,7 +343,10 @@ impl BinaryFunction {
             // a^b = exp(b·ln a)
             Self::Pow => {
                 if a.lo <= 0.0 {
-                    return None;
+                    // b·|a|^(b − 1) is the slope of a whole power
+                    let is_whole = b.lo == b.hi && b.lo >= 1.0 && b.lo.fract() == 0.0 && errors[1] == 0.0;
+                    let largest = libm::pow(add(magnitude(a), errors[0]), b.lo - 1.0).next_up().next_up();
+                    return is_whole.then(|| mul(mul(b.lo, largest), errors[0]));
                 }
                 let logarithm = magnitude(a.increasing(libm::log));
                 let change = add(mul(magnitude(b), div(errors[0], a.lo)), mul(logarithm, errors[1]));
@@ -359,5 +377,34 @@ impl BinaryFunction {
             Self::Atan2 if *a != Big::ZERO || *b != Big::ZERO => Some(a.atan2(b)),
             Self::Atan2 => Some(Big::ZERO),
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Powers of points lie in the ranges of powers, for bases of either sign.
+    #[test]
+    fn ranges_of_powers_hold_them() {
+        let bases = [(-2.0, 3.0), (-3.0, -0.5), (-1.0, 0.0), (0.0, 1.5), (0.25, 4.0), (-0.0, 0.0)];
+        let mut bounded = 0;
+        for exponent in [1.0, 2.0, 3.0, 66.0, 67.0, 0.5, 2.5, -1.0, -2.0, -0.5] {
+            for (lo, hi) in bases {
+                let range = BinaryFunction::Pow.range(Interval::new(lo, hi), Interval::point(exponent));
+                bounded += usize::from(range != Interval::ALL);
+                for i in 0..=64 {
+                    let a = lo + (hi - lo) * f64::from(i) / 64.0;
+                    let power = libm::pow(a, exponent);
+                    let may_be_anything = range == Interval::ALL;
+                    assert!(
+                        may_be_anything || range.lo <= power && power <= range.hi,
+                        "{a}^{exponent}: {range:?}"
+                    );
+                }
+            }
+        }
+        // whole exponents above 0 over all bases, others over those that are not negative, negative ones over positive ones
+        assert_eq!(bounded, 5 * 6 + 2 * 3 + 3);
     }
 }

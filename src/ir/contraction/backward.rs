@@ -5,7 +5,7 @@
 
 use std::f64::consts::{FRAC_PI_2, PI};
 
-use super::forward::{POSITIVE, sum};
+use super::forward::{POSITIVE, sum, whole_exponent};
 use super::sets::{meet, meet_either};
 use crate::interval::Interval;
 use crate::ir::function::{BinaryFunction, UnaryFunction};
@@ -267,6 +267,9 @@ pub fn slab(value: Interval, e: Interval, first: (f64, f64), second: (f64, f64))
 
 /// aᵇ = value for a fixed exponent b that is not whole, or a base that is positive.
 fn general_power(value: Interval, a: Interval, b: Interval) -> Option<[Interval; 2]> {
+    if let Some(exponent) = whole_exponent(b) {
+        return Some([power(value, a, exponent)?, b]);
+    }
     let fixed = b.lo == b.hi && b.lo != 0.0 && b.lo.is_finite();
     let has_negative_powers = b.lo.fract() == 0.0 && (a.lo < 0.0 || a.lo == 0.0 && b.lo < 0.0);
     if !fixed || has_negative_powers || !a.lo.is_finite() {

@@ -196,9 +196,21 @@ impl Squared for Interval {
     }
 }
 
+/// The largest exponent that counts as one of a whole power.
+const MOST_EXPONENT: f64 = 65536.0;
+
+/// An exponent that is one positive whole number.
+pub fn whole_exponent(b: Interval) -> Option<u32> {
+    let is_whole = b.lo == b.hi && b.lo.fract() == 0.0 && (1.0..=MOST_EXPONENT).contains(&b.lo);
+    is_whole.then_some(b.lo as u32)
+}
+
 /// aᵇ. A negative base has a power only where the exponent is whole, or if the base is infinite: (−∞)^0.1 is
 /// ∞. With a negative exponent this includes the base −0: (−0)^−1 is −∞.
 fn general_power(a: Interval, b: Interval) -> Numbers {
+    if let Some(exponent) = whole_exponent(b) {
+        return power(a, exponent).into();
+    }
     let whole = b.lo == b.hi && b.lo.fract() == 0.0;
     let may_be_whole = whole || b.lo != b.hi;
     if may_be_whole && (a.lo < 0.0 || a.lo == 0.0 && b.lo < 0.0) || !a.lo.is_finite() {

@@ -8,7 +8,7 @@ use glam::DVec3;
 
 use super::backward;
 use super::contractor::{Contractor, SCRATCH, Scratch, Wanted};
-use super::forward::power;
+use super::forward::{power, whole_exponent};
 use super::linear::LinearForm;
 use super::rule::Rule;
 use super::sets::{Contracted, meet};
@@ -218,6 +218,9 @@ fn binary(op: Binary, (a, da): (Interval, Slopes), (b, db): (Interval, Slopes), 
         }
         Binary::And => mixed(conjunction_weight(a, b), conjunction_weight(b, a)),
         Binary::Or => mixed(conjunction_weight(-a, -b), conjunction_weight(-b, -a)),
+        Binary::Call(BinaryFunction::Pow) if let Some(exponent) = whole_exponent(b) => {
+            scaled(b * power(a, exponent - 1), da)
+        }
         Binary::Call(BinaryFunction::Pow) if b.lo == b.hi && a.lo > 0.0 => scaled(b * (value / a), da),
         // an angle jumps where it turns from π to −π
         Binary::Call(BinaryFunction::Atan2) if a.contains(0.0) && b.lo <= 0.0 => {
