@@ -15,8 +15,12 @@ const MOST_NODES: usize = 48;
 const FARTHEST: f64 = 2e77;
 
 /// A factor that varies lies between these bounds, so that products are 0 nowhere but where the other factor is, or is
-/// below 1e-299. The proof is for double precision: in single precision a small factor may round to 0.
+/// below 1e-299; in single precision below 1e-29.
 const FACTORS: Interval = Interval { lo: 1e-9, hi: 1e9 };
+
+/// A factor that varies is at least this part of its largest value and of the constants in its formula: the errors of
+/// single precision are a hundredth of that, so the factor is positive in it, too.
+const LEAST_PART: f64 = 128.0 * f32::EPSILON as f64;
 
 /// How the sign of a node follows from its operands.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -88,9 +92,10 @@ impl SignRule {
 /// Whether a factor that is no constant is proven to be positive: the width of a shape that tapers, for instance.
 fn varies_above_zero(graph: &Graph, node: Node) -> bool {
     let mut seen = vec![node];
-    let (mut next, mut is_bounded) = (0, false);
+    let (mut next, mut is_bounded, mut largest) = (0, false, 0_f64);
     while let Some(&node) = seen.get(next) {
         let expr = graph.expr(node);
+        largest = largest.max(graph.as_constant(node).unwrap_or(0.0).abs());
         // most formulas without one of these are as large as their coordinates
         is_bounded |=
             matches!(expr, Expr::Unary(Unary::Call(_), _) | Expr::Binary(Binary::Min | Binary::Max, ..));
@@ -110,7 +115,7 @@ fn varies_above_zero(graph: &Graph, node: Node) -> bool {
         let over = Aabb::new(DVec3::splat(-FARTHEST), DVec3::splat(FARTHEST));
         let region = Region { time: Interval::new(-FARTHEST, FARTHEST), ..Region::of(&over) };
         let range = RangeEvaluator::new(&small, root).eval_with(&region);
-        range.lo >= FACTORS.lo && range.hi <= FACTORS.hi
+        range.lo >= FACTORS.lo.max(LEAST_PART * largest.max(range.hi)) && range.hi <= FACTORS.hi
     }
 }
 
@@ -123,7 +128,8 @@ mod tests {
     fn factors_that_stay_positive_do_not_matter() {
         let mut graph = Graph::default();
         let [x, z, time] = [Axis::X, Axis::Z, Axis::T].map(|axis| graph.coordinate(axis));
-        let [zero, one, part, small] = [0.0, 1.0, -0.4, 1e-12].map(|value| graph.constant(value));
+        let [zero, one, part, most, small] =
+            [0.0, 1.0, -0.4, -0.999_999_99, 1e-12].map(|value| graph.constant(value));
         let within = graph.binary(Binary::Max, z, zero);
         let within = graph.binary(Binary::Min, within, one);
         let part = graph.binary(Binary::Mul, part, within);
@@ -142,7 +148,10 @@ mod tests {
         // it may become so small that the product is 0 before x is
         let thin = graph.binary(Binary::Add, small, within);
         // it may be 0, or as large as its coordinates
-        for factor in [within, z, part, thin] {
+        // 1 − 0.99999999 is 1e-8, but 0 in single precision
+        let most = graph.binary(Binary::Mul, most, within);
+        let sharp = graph.binary(Binary::Add, one, most);
+        for factor in [within, z, part, thin, sharp] {
             let product = graph.binary(Binary::Mul, x, factor);
             assert_eq!(SignRule::of(&graph, product), SignRule::Leaf);
         }
