@@ -354,21 +354,55 @@ impl Boundary {
     }
 
     /// The faces of an obstacle near a particle. Where it ends behind one of them within the support radius,
-    /// as a thin plate does, the face in which it ends is listed with it.
+    /// as a thin plate does, the face in which it ends is listed with it; and where it has a face across the fluid as
+    /// well, as a narrow channel does, that is listed, because a formula such as `y*(b - y)` tells the nearest alone.
     fn faces_before(&self, wall: &Wall, p: DVec3, k: usize) -> Faces {
         let mut told = Faces::new();
         self.field(k).faces(p, wall.h, &mut told);
         let mut faces = Faces::new();
-        for part in told {
+        for part in &told {
             if let Part::Face(front) = part
-                && let Some(back) = self.back_of(wall, p, &front, k)
+                && let Some(across) = self.across_from(wall, p, (front, &told), k)
+            {
+                faces.push(Part::Any(2));
+                faces.push(Part::Face(across));
+            }
+            if let Part::Face(front) = part
+                && let Some(back) = self.back_of(wall, p, front, k)
             {
                 faces.push(Part::All(2));
                 faces.push(Part::Face(back));
             }
-            faces.push(part);
+            faces.push(*part);
         }
         faces
+    }
+
+    /// The face of an obstacle across the fluid from another one of it, within the support radius; `None` if there is none,
+    /// or if it is told anyway.
+    fn across_from(&self, wall: &Wall, p: DVec3, (front, told): (&Face, &Faces), k: usize) -> Option<Face> {
+        let deep = BEHIND * wall.h;
+        if front.distance < -deep || front.distance >= wall.h {
+            return None;
+        }
+        let way = 0.5 * wall.h;
+        let mut there = Faces::new();
+        self.field(k).faces(p + way * front.normal, wall.h, &mut there);
+        let seen = there.iter().filter_map(|part| match part {
+            Part::Face(face) => {
+                let looks_here = front.normal.dot(face.normal) < PARALLEL - 1.0;
+                looks_here.then_some(Face { distance: face.distance + way, ..*face })
+            }
+            Part::All(_) | Part::Any(_) => None,
+        });
+        let is_within = |face: &Face| face.distance > -deep && face.distance < wall.h;
+        let across = seen.filter(is_within).min_by(|a, b| a.distance.total_cmp(&b.distance))?;
+        let is_told = told.iter().any(|part| match part {
+            Part::Face(face) => face.normal.dot(across.normal) > 1.0 - PARALLEL,
+            Part::All(_) | Part::Any(_) => false,
+        });
+        let begins = || self.field(k).omega(p + (across.distance + deep) * front.normal) >= 0.0;
+        (!is_told && begins()).then_some(across)
     }
 
     /// The face in which an obstacle ends behind another one that is before a particle; `None` if that is not

@@ -191,3 +191,21 @@ fn between_two_walls_each_presses_by_itself() {
         shares(&boundary(1.0), DVec3::new(0.5, 0.0, 2.0), Pushed { factor: -4.0, ..Pushed::default() });
     assert!(left.x > 1.0 && (left + right).length() < 1e-12, "{left} {right}");
 }
+
+/// The walls of a channel are one formula, which tells the nearest face alone. What stands behind the other one is pressed
+/// by nothing.
+#[test]
+fn a_channel_has_both_of_its_faces() {
+    let sides = Closures {
+        omega: |p: DVec3| (p.x - 0.5).abs() - 0.5,
+        gradient: |p: DVec3| (p.x - 0.5).signum() * DVec3::X,
+    };
+    let behind = Closures { omega: |p: DVec3| p.x - 1.1, gradient: |_: DVec3| DVec3::X };
+    let boundary = around(vec![sticky(sides), sticky(behind)]);
+    for x in [0.4, 0.49, 0.51, 0.6] {
+        let pushed = Pushed { factor: -4.0, ..Pushed::default() };
+        let [of_sides, of_behind] = shares(&boundary, DVec3::new(x, 0.0, 2.0), pushed);
+        assert_eq!(of_behind, DVec3::ZERO, "{x}");
+        assert_eq!(of_sides, DVec3::ZERO, "{x}: nothing pushes the particle");
+    }
+}
