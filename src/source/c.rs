@@ -16,6 +16,19 @@ use crate::precision::Precision;
 /// A function with more operations than this is divided: gcc -O3 needs time that grows faster than its length.
 const LONGEST_FUNCTION: usize = 1500;
 
+/// gcc takes the choices of one result after the other for partly redundant and moves them into branches, which it then
+/// does not vectorise. Clang does not.
+const LEFT_WHOLE: [&str; 4] = [
+    "#if defined(__GNUC__) && !defined(__clang__)",
+    "#pragma GCC push_options",
+    "#pragma GCC optimize (\"no-tree-pre\") /* choices stay choices, and loops are vectorised */",
+    "#endif",
+];
+
+/// After it, the options of the command hold again: for what follows a header.
+const RESTORED: [&str; 3] =
+    ["#if defined(__GNUC__) && !defined(__clang__)", "#pragma GCC pop_options", "#endif"];
+
 /// The kinds of files.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Flavour {
@@ -43,6 +56,9 @@ pub(super) fn source(file: &File<'_>, flavour: Flavour) -> Result<String, Source
     let writer = CFile { file, flavour };
     let mut lines = writer.head();
     lines.extend(writer.macros());
+    if flavour != Flavour::Cuda {
+        lines.extend(LEFT_WHOLE.map(String::from));
+    }
     lines.extend(writer.params());
     if flavour == Flavour::Unit {
         lines.push(String::new());
@@ -70,6 +86,10 @@ pub(super) fn source(file: &File<'_>, flavour: Flavour) -> Result<String, Source
     lines.extend(writer.library(&called));
     lines.extend(writer.operations(&operations));
     lines.extend(functions);
+    if flavour == Flavour::Header {
+        lines.push(String::new());
+        lines.extend(RESTORED.map(String::from));
+    }
     if flavour != Flavour::Unit {
         lines.push(String::new());
         lines.push("#endif".into());

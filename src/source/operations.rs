@@ -107,15 +107,16 @@ const TEXTBOOK_WEIGHTS: &str = "by_u = {1} ∓ u / h
 by_v = {1} ∓ v / h
 ";
 
-/// The weights from τ. A choice of choices, and not a comparison of two truth values: compilers then keep their
-/// vectors.
+/// The weights from τ. Choices of results, and not a comparison of two truth values: compilers then keep their vectors.
 const WEIGHTS: &str = "square = tau * tau
 scale = {1} / ({1} + square)
 rest = {1} ∓ tau
 lesser = rest * rest * scale
 greater = pick(is_small, square, {1}) * (scale + scale)
-by_u = pick(is_small, pick(u_is_near, lesser, greater), pick(u_is_near, greater, lesser))
-by_v = pick(is_small, pick(v_is_near, lesser, greater), pick(v_is_near, greater, lesser))
+of_near = pick(is_small, lesser, greater)
+of_far = pick(is_small, greater, lesser)
+by_u = pick(u_is_near, of_near, of_far)
+by_v = pick(v_is_near, of_near, of_far)
 ";
 
 /// |a|ᵇ with the sign that a whole b gives it; NaN for other exponents, from the root of a negative number.
