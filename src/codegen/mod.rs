@@ -17,7 +17,7 @@ mod operations;
 mod r0;
 mod range;
 mod request;
-mod sine;
+pub(crate) mod sine;
 mod translate;
 
 pub use host_functions::Library;

@@ -8,7 +8,7 @@ use super::c_room::Room;
 use super::language::{C, Function};
 use super::operations::{Names, Operation, WEIGHTED_FIELDS};
 use super::program::{Program, Question};
-use super::statements::{Part, Statements, Writer};
+use super::statements::{Own, Part, Statements, Writer};
 use super::{File, Math, OpenParam, PARAMS, SourceError};
 use crate::ir::Forms;
 use crate::precision::Precision;
@@ -72,12 +72,13 @@ pub(super) fn source(file: &File<'_>, flavour: Flavour) -> Result<String, Source
         called.extend(uniforms.functions.iter().map(|&function| (function, false)));
         functions.extend(uniforms.lines);
         for &precision in file.precisions {
-            let (body, room) = writer.body(program, precision)?;
+            let (body, steps) = writer.body(program, precision)?;
             operations.extend(body.operations.iter().map(|&op| (op, precision == Precision::F32)));
             called.extend(body.functions.iter().map(|&function| (function, precision == Precision::F32)));
             functions.extend(body.lines);
-            functions.extend(writer.point(program, precision, room.as_ref()));
-            functions.extend(writer.columns(program, precision, room.as_ref()));
+            let long = steps.as_ref().filter(|steps| steps.are_for_points).map(|steps| &steps.room);
+            functions.extend(writer.point(program, precision, long));
+            functions.extend(writer.columns(program, precision, steps.as_ref()));
             if flavour == Flavour::Cuda {
                 functions.extend(writer.kernel(program, precision));
             }
@@ -120,6 +121,15 @@ struct Body {
     lines: Vec<String>,
     operations: BTreeSet<Operation>,
     functions: BTreeSet<Function>,
+}
+
+/// A program as steps over blocks of points.
+struct Steps {
+    /// The function of one block.
+    name: String,
+    room: Room,
+    /// Whether single points take them as well: the formula is too long for one function.
+    are_for_points: bool,
 }
 
 pub(super) struct CFile<'a> {
@@ -331,6 +341,7 @@ impl CFile<'_> {
     ) -> Writer<'w> {
         let math = self.file.options.math;
         let axes = ["x", "y", "z", "t"];
+        let own = if self.flavour == Flavour::Cuda { Own::Nothing } else { Own::Waves };
         Writer {
             language: &C,
             precision,
@@ -341,7 +352,7 @@ impl CFile<'_> {
             uniform,
             gathered: None,
             values: "v",
-            own_functions: false,
+            own,
         }
     }
 
@@ -355,6 +366,7 @@ impl CFile<'_> {
         let names = self.names();
         let parameter = |i: u32| format!("p->{}", self.file.field(i));
         let writer = self.writer(&names, Precision::F64, &|_| String::new(), &parameter);
+        let writer = Writer { own: Own::Nothing, ..writer };
         let forms = Forms::default();
         let made = writer.statements(&Part { graph, inputs: &[], outputs: roots, forms: &forms })?;
         let arguments = self.extra_arguments();
@@ -426,11 +438,30 @@ impl CFile<'_> {
         Ok((chain.made, folds.room))
     }
 
-    fn body(&self, program: &Program, precision: Precision) -> Result<(Body, Option<Room>), SourceError> {
+    fn body(&self, program: &Program, precision: Precision) -> Result<(Body, Option<Steps>), SourceError> {
         if self.flavour != Flavour::Cuda && program.operations() > LONGEST_FUNCTION {
             let (Statements { lines, operations, functions, .. }, room) = self.long(program, precision)?;
-            return Ok((Body { lines, operations, functions }, Some(room)));
+            let steps = Steps { name: self.at_name(program, precision), room, are_for_points: true };
+            return Ok((Body { lines, operations, functions }, Some(steps)));
         }
+        let mut body = self.whole(program, precision)?;
+        if self.flavour == Flavour::Cuda {
+            return Ok((body, None));
+        }
+        let Some(folds) = Folds::of_calls(program, precision) else { return Ok((body, None)) };
+        let names = self.names();
+        let uniform = |i: u32| format!("u[{i}]");
+        let writer = self.writer(&names, precision, &uniform, &|_| String::new());
+        let name = format!("{}_steps_{}{}", self.file.prefix, program.question.name(), C.suffix(precision));
+        let made = folds.write(&writer, &name, program)?.made;
+        body.lines.extend(made.lines);
+        body.operations.extend(made.operations);
+        body.functions.extend(made.functions);
+        Ok((body, Some(Steps { name, room: folds.room, are_for_points: false })))
+    }
+
+    /// A program as one function, for one point.
+    fn whole(&self, program: &Program, precision: Precision) -> Result<Body, SourceError> {
         let names = self.names();
         let parameter = |_: u32| String::new();
         let uniform = |i: u32| format!("u[{i}]");
@@ -461,7 +492,7 @@ impl CFile<'_> {
             lines.insert(lines.len() - 1, "    (void)u;".into());
         }
         lines.push("}".into());
-        Ok((Body { lines, operations, functions }, None))
+        Ok(Body { lines, operations, functions })
     }
 
     /// The structure of ω and ∇ω.
@@ -494,7 +525,7 @@ impl CFile<'_> {
     }
 
     /// The function for columns.
-    fn columns(&self, program: &Program, precision: Precision, room: Option<&Room>) -> Vec<String> {
+    fn columns(&self, program: &Program, precision: Precision, steps: Option<&Steps>) -> Vec<String> {
         let question = program.question;
         let signature = self
             .columns_signature(question, precision)
@@ -504,8 +535,8 @@ impl CFile<'_> {
         lines.extend(self.fill_uniforms(program, precision));
         let (number, name) = (C.number(precision), self.at_name(program, precision));
         let u = if program.uniforms.is_some() { ", u" } else { "" };
-        if let Some(room) = room {
-            lines.extend(room.columns(&name, number, question));
+        if let Some(Steps { name, room, .. }) = steps {
+            lines.extend(room.columns(name, number, question));
             lines.push("}".into());
             return lines;
         }

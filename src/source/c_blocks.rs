@@ -159,7 +159,7 @@ impl Blocks {
         let known = written.chunks.get(&text).copied();
         let called = known.unwrap_or_else(|| {
             let counts = [chunk.reads.len(), chunk.writes.len()];
-            self.room.loop_of(name, counts, has_constants, &body, &mut written.made);
+            self.room.loop_of(name, counts, has_constants, (&body, None), &mut written.made);
             let columns = chunk.reads.len() + chunk.writes.len();
             written.called.push(Called { name: name.into(), is_piece: true, has_constants, columns });
             written.chunks.insert(text, written.called.len() - 1);
@@ -192,7 +192,7 @@ impl Blocks {
         let part = Part { graph, inputs: &inputs, outputs: &piece.outputs, forms: &forms };
         let body = writer.statements(&part)?;
         let counts = [piece.inputs.len(), piece.outputs.len()];
-        self.room.loop_of(name, counts, piece.parameters > 0, &body, made);
+        self.room.loop_of(name, counts, piece.parameters > 0, (&body, None), made);
         Ok(())
     }
 

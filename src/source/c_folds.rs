@@ -7,11 +7,12 @@ use std::cell::RefCell;
 use std::collections::HashMap;
 
 use super::SourceError;
+use super::c_calls::{is_of_waves, stages};
 use super::c_links::{Chunk, chunks};
 use super::c_room::{Called, IN_COLUMNS, Long, Room};
 use super::language::C;
 use super::program::Program;
-use super::statements::{Part, Statements, Writer};
+use super::statements::{Own, Part, Statements, Writer};
 use crate::ir::Node;
 use crate::precision::Precision;
 
@@ -31,6 +32,8 @@ struct Step {
 /// The steps whose texts are equal.
 struct Shape {
     body: Statements,
+    /// Calls of the library for the points where the body gives NaN.
+    mend: Option<Statements>,
     reads: usize,
     writes: usize,
     /// The constants of each of its steps.
@@ -49,6 +52,12 @@ impl Folds {
         Self { steps, room: Room::new(precision, columns, program.uniforms.is_some()) }
     }
 
+    /// The steps of a program that calls functions of the mathematical library, for loops without calls.
+    pub fn of_calls(program: &Program, precision: Precision) -> Option<Self> {
+        let (steps, columns) = placed(stages(&program.graph, &program.outputs)?, &program.outputs);
+        Some(Self { steps, room: Room::new(precision, columns, program.uniforms.is_some()) })
+    }
+
     /// The functions and tables: in the end a function that evaluates one block.
     pub fn write(&self, writer: &Writer<'_>, name: &str, program: &Program) -> Result<Long, SourceError> {
         let (shapes, places) = self.shapes(writer, program)?;
@@ -56,7 +65,8 @@ impl Folds {
         let mut called = Vec::new();
         for (number, shape) in shapes.iter().enumerate() {
             let (name, has_constants) = (format!("{name}_part{number}"), !shape.varying.is_empty());
-            self.room.loop_of(&name, [shape.reads, shape.writes], has_constants, &shape.body, &mut made);
+            let body = (&shape.body, shape.mend.as_ref());
+            self.room.loop_of(&name, [shape.reads, shape.writes], has_constants, body, &mut made);
             called.push(Called { name, is_piece: true, has_constants, columns: shape.reads + shape.writes });
         }
         let (mut constants, mut table) = (Vec::new(), Vec::new());
@@ -85,7 +95,9 @@ impl Folds {
         let (mut shapes, mut places): (Vec<Shape>, Vec<Place>) = (Vec::new(), Vec::new());
         for Step { chunk, .. } in &self.steps {
             let gathered = RefCell::new(Vec::new());
-            let writer = Writer { axes: IN_COLUMNS, gathered: Some(&gathered), ..*writer };
+            let of_waves = is_of_waves(&program.graph, chunk);
+            let own = if of_waves { Own::FastWaves } else { writer.own };
+            let writer = Writer { axes: IN_COLUMNS, gathered: Some(&gathered), own, ..*writer };
             let inputs: Vec<(Node, String)> =
                 chunk.reads.iter().enumerate().map(|(i, &node)| (node, format!("r{i}[i]"))).collect();
             let part = Part { graph: &program.graph, inputs: &inputs, outputs: &chunk.writes, forms };
@@ -94,7 +106,10 @@ impl Folds {
             let number = *known.entry(text).or_insert(shapes.len());
             if number == shapes.len() {
                 let [reads, writes] = [chunk.reads.len(), chunk.writes.len()];
-                shapes.push(Shape { body, reads, writes, constants: Vec::new(), varying: Vec::new() });
+                let again = RefCell::new(Vec::new());
+                let slow = Writer { gathered: Some(&again), own: Own::Nothing, ..writer };
+                let mend = of_waves.then(|| slow.statements(&part)).transpose()?;
+                shapes.push(Shape { body, mend, reads, writes, constants: Vec::new(), varying: Vec::new() });
             }
             places.push((number, shapes[number].constants.len()));
             shapes[number].constants.push(gathered.into_inner());
@@ -116,8 +131,10 @@ impl Shape {
                 Err(_) => C.constant(first[k], precision).unwrap_or_default(),
             })
             .collect();
-        for text in self.body.lines.iter_mut().chain(&mut self.body.outputs) {
-            *text = replaced(text, &texts);
+        for body in [Some(&mut self.body), self.mend.as_mut()].into_iter().flatten() {
+            for text in body.lines.iter_mut().chain(&mut body.outputs) {
+                *text = replaced(text, &texts);
+            }
         }
     }
 }

@@ -9,6 +9,7 @@ use std::hash::{Hash, Hasher};
 
 use rustc_hash::FxHasher;
 
+use super::c_calls::is_call;
 use super::c_chunks::carried;
 use crate::ir::{Binary, Expr, Graph, Node, R0, Unary, UnaryFunction};
 
@@ -97,16 +98,19 @@ impl<'a> Formula<'a> {
     }
 
     /// The ends of the chunks: the longest that has been seen before, or else where the fewest results are handed on.
-    /// What joins two parts is a chunk of its own: with others in many orders, it would be compiled as often. The second
-    /// result is the number of operations in chunks that differ.
+    /// What joins two parts is a chunk of its own: with others in many orders, it would be compiled as often. So are calls
+    /// of the mathematical library, whose loops are not vectorised. The second result is the number of operations in chunks
+    /// that differ.
     fn cuts(&self, window: usize) -> (Vec<usize>, usize) {
         let carried = carried(&self.order, &self.last_read, FAR);
         let (mut cuts, mut start, mut different) = (Vec::new(), 0, 0);
         let mut seen: HashSet<u64> = HashSet::new();
         while start < self.order.len() {
-            let end = self.joined_end(start).unwrap_or_else(|| {
+            let alone = self.joined_end(start).or_else(|| self.called_end(start));
+            let end = alone.unwrap_or_else(|| {
                 let most = (start + window).min(self.order.len());
-                let last = (start..most).find(|&i| self.joint(i).is_some()).unwrap_or(most);
+                let is_alone = |&i: &usize| self.joint(i).is_some() || is_call(self.graph, self.order[i]);
+                let last = (start..most).find(is_alone).unwrap_or(most);
                 let least = (start + LEAST).min(last);
                 let patterns = self.patterns(start, last);
                 let known = (least..=last).rev().find(|&end| seen.contains(&patterns[end - start - 1]));
@@ -175,6 +179,19 @@ impl<'a> Formula<'a> {
         (start..self.order.len()).find(|&i| self.joint(i) != Some(first)).or(Some(self.order.len()))
     }
 
+    /// Where a call ends that begins at a place: one function, or the sine and the cosine of one argument.
+    fn called_end(&self, start: usize) -> Option<usize> {
+        let first = self.order[start];
+        if !is_call(self.graph, first) {
+            return None;
+        }
+        let is_both = self.order.get(start + 1).is_some_and(|&next| {
+            let together: Vec<Node> = companions(self.graph, first).collect();
+            together.contains(&first) && together.contains(&next)
+        });
+        Some(start + 1 + usize::from(is_both))
+    }
+
     /// The operands of R₀ or of a choice between two results, and which of these it is, if there is one at a place.
     fn joint(&self, place: usize) -> Option<(Node, Node, Binary)> {
         let Expr::Binary(op, u, v) = self.graph.expr(self.order[place]) else { return None };
@@ -237,7 +254,7 @@ fn ordered(graph: &Graph, outputs: &[Node]) -> Vec<Node> {
 }
 
 /// Nodes of the same operands that are computed with a node in one go: weights of R₀, and sine and cosine.
-fn companions(graph: &Graph, node: Node) -> impl Iterator<Item = Node> {
+pub(super) fn companions(graph: &Graph, node: Node) -> impl Iterator<Item = Node> {
     let found = match graph.expr(node) {
         Expr::Binary(op, u, v) => match op.r0() {
             Some(R0::And | R0::AndWeight) => joined(u, v, [Binary::And, Binary::AndWeight]),
@@ -258,7 +275,7 @@ fn joined(u: Node, v: Node, [value, weight]: [Binary; 2]) -> Vec<Expr> {
 }
 
 /// Which nodes are computed again wherever they are read.
-fn cheap(graph: &Graph) -> Vec<bool> {
+pub(super) fn cheap(graph: &Graph) -> Vec<bool> {
     let mut cost = vec![usize::MAX; graph.len()];
     for (node, expr) in graph.nodes() {
         cost[node.index()] = match expr {

@@ -44,26 +44,24 @@ pub(super) struct Long {
 
 impl Room {
     pub fn new(precision: Precision, columns: usize, has_uniforms: bool) -> Self {
-        let size = match precision {
-            Precision::F64 => 8,
-            Precision::F32 => 4,
-        };
-        let fitting = CACHED_BYTES / (size * columns.max(1));
+        let fitting = CACHED_BYTES / (size(precision) * columns.max(1));
         let points = (fitting / SHORTEST * SHORTEST).clamp(SHORTEST, LONGEST);
         Self { precision, columns, points, has_uniforms }
     }
 
-    /// A function that computes statements for the points of a block.
+    /// A function that computes statements for the points of a block, and those of `mend` where the first result is NaN.
     pub fn loop_of(
         &self,
         name: &str,
         [reads, writes]: [usize; 2],
         has_constants: bool,
-        body: &Statements,
+        (body, mend): (&Statements, Option<&Statements>),
         made: &mut Statements,
     ) {
-        made.operations.extend(&body.operations);
-        made.functions.extend(&body.functions);
+        for statements in [Some(body), mend].into_iter().flatten() {
+            made.operations.extend(&statements.operations);
+            made.functions.extend(&statements.functions);
+        }
         let number = C.number(self.precision);
         let mut arguments = vec!["size_t n".to_string()];
         arguments.extend(["x", "y", "z"].map(|axis| format!("const {number} *RFM_RESTRICT {axis}")));
@@ -79,13 +77,26 @@ impl Room {
         lines.push(String::new());
         lines.push(format!("RFM_NOINLINE void {name}({}) {{", arguments.join(", ")));
         lines.push("    size_t i;".into());
+        lines.extend(mend.map(|_| "    int any = 0;".to_string()));
         let unused = [("u", self.has_uniforms), ("c", has_constants)];
         let unused = unused.iter().filter(|(_, is)| *is).map(|(name, _)| format!(" (void){name};"));
         lines.push(format!("    (void)x; (void)y; (void)z;{}", unused.collect::<String>()));
+        let inner = |body: &Statements| {
+            let results = body.outputs.iter().enumerate().map(|(i, text)| format!("w{i}[i] = {text};"));
+            let inner: Vec<String> = body.lines.iter().cloned().chain(results).collect();
+            inner.into_iter().map(|line| format!("        {line}"))
+        };
         lines.push("    for (i = 0; i < n; i++) {".into());
-        lines.extend(body.lines.iter().map(|line| format!("        {line}")));
-        lines.extend(body.outputs.iter().enumerate().map(|(i, text)| format!("        w{i}[i] = {text};")));
-        lines.extend(["    }".into(), "}".to_string()]);
+        lines.extend(inner(body));
+        lines.push("    }".into());
+        if let Some(mend) = mend {
+            lines.push("    for (i = 0; i < n; i++) any |= w0[i] != w0[i];".into());
+            lines.push("    for (i = 0; any && i < n; i++) {".into());
+            lines.push("        if (w0[i] == w0[i]) continue;".into());
+            lines.extend(inner(mend));
+            lines.push("    }".into());
+        }
+        lines.push("}".into());
     }
 
     /// The constants, the table of steps, and the function that takes them: the number of a function, counted from 1, its
@@ -172,16 +183,18 @@ impl Room {
         let results = question.results();
         let u = self.uniforms_argument();
         let (points, columns) = (self.points, self.columns.max(1));
-        let mut lines = vec![
-            "    size_t at;".to_string(),
-            format!(
+        let mut lines = vec!["    size_t at;".to_string()];
+        let on_stack = columns * points * size(self.precision) <= CACHED_BYTES;
+        if on_stack {
+            lines.push(format!("    {number} columns[{columns} * {points}];"));
+        } else {
+            lines.push(format!(
                 "    {number} *columns = ({number} *)malloc((size_t){columns} * {points} * sizeof({number}));"
-            ),
-            "    if (!columns) {".into(),
-            "        for (at = 0; at < n; at++) {".into(),
-        ];
-        lines.extend(results.iter().map(|result| format!("            {result}[at] = NAN;")));
-        lines.extend(["        }", "        return;", "    }"].map(String::from));
+            ));
+            lines.extend(["    if (!columns) {", "        for (at = 0; at < n; at++) {"].map(String::from));
+            lines.extend(results.iter().map(|result| format!("            {result}[at] = NAN;")));
+            lines.extend(["        }", "        return;", "    }"].map(String::from));
+        }
         lines.push(format!("    for (at = 0; at < n; at += {points}) {{"));
         lines.push(format!("        const size_t m = n - at < {points} ? n - at : {points};"));
         lines.push(format!("        {number} *out[{}];", results.len()));
@@ -189,11 +202,20 @@ impl Room {
             results.iter().enumerate().map(|(i, result)| format!("        out[{i}] = {result} + at;")),
         );
         lines.push(format!("        {name}(m, x + at, y + at, z + at{u}, columns, {points}, out);"));
-        lines.extend(["    }", "    free(columns);"].map(String::from));
+        lines.push("    }".into());
+        lines.extend((!on_stack).then(|| "    free(columns);".to_string()));
         lines
     }
 
     fn uniforms_argument(&self) -> &'static str {
         if self.has_uniforms { ", u" } else { "" }
+    }
+}
+
+/// Bytes of a number.
+fn size(precision: Precision) -> usize {
+    match precision {
+        Precision::F64 => 8,
+        Precision::F32 => 4,
     }
 }

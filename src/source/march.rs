@@ -10,7 +10,7 @@
 use super::operations::Names;
 use super::program::{Program, Question};
 use super::shader::{self, GLSL};
-use super::statements::Writer;
+use super::statements::{Own, Writer};
 use super::{File, Math, Options, Param, SourceError, in_file, language};
 use crate::ir::{Axis, Binary, BinaryFunction, Expr, Graph, Node, Unary, UnaryFunction};
 use crate::precision::Precision;
@@ -120,7 +120,7 @@ fn range(file: &File<'_>, program: &Program) -> Result<(Vec<String>, usize), Sou
         uniform: &uniform,
         gathered: None,
         values: "s",
-        own_functions: true,
+        own: Own::Shaders,
     };
     let Program { graph, outputs, .. } = program;
     let root = match graph.expr(outputs[0]) {

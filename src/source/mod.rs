@@ -20,6 +20,7 @@
 //! | `c`, `rust`, `shader` | whole files: heads, parameters, one point and columns |
 //! | `c_blocks`, `c_chunks` | long formulas of C in parts |
 //! | `c_folds`, `c_links` | long formulas of C as chains |
+//! | `c_calls`, `c_waves` | loops of C around the functions of the mathematical library, and its own sine and cosine |
 //! | `c_room` | the columns of blocks of points, and the tables of steps over them |
 //! | `march` | functions for a ray-marcher: sign, gradient and range of ω |
 //! | `object`, `c_object` | object code with its header |
@@ -30,11 +31,13 @@
 
 mod c;
 mod c_blocks;
+mod c_calls;
 mod c_chunks;
 mod c_folds;
 mod c_links;
 mod c_object;
 mod c_room;
+mod c_waves;
 mod language;
 mod march;
 mod names;

@@ -4,6 +4,7 @@
 //! is a where c holds and b elsewhere. These are the operations of `ir::r0`, in their order, with the signs of a
 //! disjunction worked in: so the C has the bits of the interpreter.
 
+use super::c_waves::{self, Wave};
 use super::language::{Head, Language};
 use crate::ir::{Form, R0, r0};
 use crate::precision::Precision;
@@ -23,6 +24,10 @@ pub(super) enum Operation {
     Cos,
     /// tan u, likewise.
     Tan,
+    /// sin u in C, with the bits of `rfm`; NaN where the library is to be called.
+    FastSin,
+    /// cos u, likewise.
+    FastCos,
 }
 
 /// ∧ or ∨
@@ -174,11 +179,13 @@ impl Operation {
             Self::Sin => "op_sin".into(),
             Self::Cos => "op_cos".into(),
             Self::Tan => "op_tan".into(),
+            Self::FastSin => "op_fast_sin".into(),
+            Self::FastCos => "op_fast_cos".into(),
         }
     }
 
     /// Its formula, line by line.
-    fn formula(self) -> String {
+    fn formula(self, precision: Precision) -> String {
         let branch = |junction| match junction {
             Junction::And => "nearer = low\nfarther = high\nis_small? = sum > {0}\n",
             Junction::Or => "nearer = high\nfarther = low\nis_small? = sum < {0}\n",
@@ -205,6 +212,8 @@ impl Operation {
             Self::Sin => (Junction::And, vec![QUARTER, SIN]),
             Self::Cos => (Junction::And, vec![QUARTER, COS]),
             Self::Tan => (Junction::And, vec![QUARTER, TAN]),
+            Self::FastSin => return c_waves::formula(Wave::Sine, precision),
+            Self::FastCos => return c_waves::formula(Wave::Cosine, precision),
         };
         signed(&parts, junction)
     }
@@ -218,25 +227,34 @@ impl Operation {
         let name = names.operation(self, language, precision);
         let operands: &[&str] = match self {
             Self::Join(..) | Self::Weighted(..) | Self::Power => &["u", "v"],
-            Self::Sin | Self::Cos | Self::Tan => &["u"],
+            Self::Sin | Self::Cos | Self::Tan | Self::FastSin | Self::FastCos => &["u"],
+        };
+        // the precision that it computes in
+        let inner = match self {
+            Self::FastSin | Self::FastCos => Precision::F64,
+            Self::Join(..) | Self::Weighted(..) | Self::Power | Self::Sin | Self::Cos | Self::Tan => {
+                precision
+            }
         };
         let mut lines: Vec<String> = (language.head)(Head { result, name: &name, operand: number, operands })
             .lines()
             .map(String::from)
             .collect();
-        let write = |text: &str| translated(text, language, precision, names);
-        let formula = self.formula();
+        let pick = names.pick(language, precision);
+        let write = |text: &str| translated(text, language, inner, &pick);
+        let formula = self.formula(precision);
         for (name, value) in used_lines(&formula, weighted) {
             let (name, kind) = match name.strip_suffix('?') {
                 Some(name) => (name, language.truth),
-                None => (name, number),
+                None => (name, language.number(inner)),
             };
             lines.push(format!("    {}", (language.declare)(kind, name, &write(value))));
         }
         let last = if weighted {
             (language.give_all)(&joint, &WEIGHTED_FIELDS)
         } else {
-            vec![(language.give)("value")]
+            let converted = format!("({number})value");
+            vec![(language.give)(if inner == precision { "value" } else { &converted })]
         };
         lines.extend(last.into_iter().map(|line| format!("    {line}")));
         lines.push("}".into());
@@ -290,7 +308,7 @@ fn signed(parts: &[&str], junction: Junction) -> String {
 }
 
 /// An expression of a formula in a language.
-fn translated(text: &str, language: &Language, precision: Precision, names: &Names<'_>) -> String {
+fn translated(text: &str, language: &Language, precision: Precision, pick: &str) -> String {
     let constant = |value: f64| language.constant(value, precision).unwrap_or_default();
     let numbers = text.split('{').skip(1).filter_map(|rest| rest.split_once('}').map(|(number, _)| number));
     let numbers = numbers.filter_map(|number| Some((format!("{{{number}}}"), number.parse().ok()?)));
@@ -299,7 +317,7 @@ fn translated(text: &str, language: &Language, precision: Precision, names: &Nam
     let function = |both: [&'static str; 2]| super::language::pair(both, precision).to_string() + "(";
     text.replace("{corner}", &constant(r0::SINGULAR_TAU))
         .replace("{-corner}", &constant(-r0::SINGULAR_TAU))
-        .replace("pick(", &format!("{}(", names.pick(language, precision)))
+        .replace("pick(", &format!("{pick}("))
         .replace("sqrt(", &function(language.root))
         .replace("abs(", &function(language.magnitude))
 }

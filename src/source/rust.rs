@@ -5,7 +5,7 @@ use std::collections::BTreeSet;
 use super::language::RUST;
 use super::operations::{Names, Operation, WEIGHTED_FIELDS};
 use super::program::{Program, Question};
-use super::statements::{Part, Statements, Writer};
+use super::statements::{Own, Part, Statements, Writer};
 use super::{File, Math, OpenParam, PARAMS, SourceError};
 use crate::ir::Forms;
 use crate::precision::Precision;
@@ -138,7 +138,7 @@ impl RustFile<'_> {
             uniform: &|i| format!("u[{i}]"),
             gathered: None,
             values: "v",
-            own_functions: false,
+            own: Own::Nothing,
         }
     }
 

@@ -5,7 +5,7 @@ use std::collections::BTreeSet;
 use super::language::{self, Language};
 use super::operations::{Names, Operation, WEIGHTED_FIELDS};
 use super::program::{Program, Question};
-use super::statements::{Part, Statements, Writer};
+use super::statements::{Own, Part, Statements, Writer};
 use super::{File, Math, OpenParam, PARAMS, SourceError};
 use crate::ir::Forms;
 use crate::precision::Precision;
@@ -122,7 +122,7 @@ fn function(
         uniform: &uniform_names,
         gathered: None,
         values: "v",
-        own_functions: true,
+        own: Own::Shaders,
     };
     let Program { graph, outputs, question, .. } = program;
     let part = Part { graph, inputs: &[], outputs, forms: program.forms(PRECISION) };

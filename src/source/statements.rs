@@ -27,8 +27,19 @@ pub(super) struct Writer<'a> {
     pub gathered: Option<&'a RefCell<Vec<f64>>>,
     /// What the names of values begin with, so that two graphs may stand in one function.
     pub values: &'a str,
-    /// Whether sin, cos and tan and powers of negative numbers need functions of the file's own.
-    pub own_functions: bool,
+    pub own: Own,
+}
+
+/// Which functions of the mathematical library a file has of its own.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Own {
+    Nothing,
+    /// sin and cos, which call the library for a few arguments.
+    Waves,
+    /// sin and cos that are NaN for these arguments: loops over columns mend them, see `c_calls`.
+    FastWaves,
+    /// sin, cos, tan and powers of negative numbers: those of shaders are inaccurate or undefined.
+    Shaders,
 }
 
 /// A graph as statements.
@@ -211,7 +222,7 @@ impl State<'_> {
     }
 
     fn unary(&mut self, op: Unary, a: &str) -> Result<String, SourceError> {
-        let Writer { language, precision, math, own_functions, .. } = *self.writer;
+        let Writer { language, precision, own, .. } = *self.writer;
         let of = |both| format!("{}({a})", super::language::pair(both, precision));
         Ok(match op {
             Unary::Neg => format!("-{a}"),
@@ -224,18 +235,40 @@ impl State<'_> {
             }
             Unary::Floor => of(language.floor),
             Unary::Round => of(language.round),
-            Unary::Call(UnaryFunction::Sin) if own_functions => self.operation(Operation::Sin, a),
-            Unary::Call(UnaryFunction::Cos) if own_functions => self.operation(Operation::Cos, a),
-            Unary::Call(UnaryFunction::Tan) if own_functions => self.operation(Operation::Tan, a),
-            Unary::Call(function) => {
-                self.made.functions.insert(Function::Unary(function));
-                (language.function)(Function::Unary(function), precision, math, &[a])
-            }
+            Unary::Call(UnaryFunction::Sin) => self.wave(UnaryFunction::Sin, a),
+            Unary::Call(UnaryFunction::Cos) => self.wave(UnaryFunction::Cos, a),
+            Unary::Call(UnaryFunction::Tan) if own == Own::Shaders => self.operation(Operation::Tan, a),
+            Unary::Call(function) => self.library(Function::Unary(function), &[a]),
         })
     }
 
+    /// The call of a function of the mathematical library.
+    fn library(&mut self, function: Function, operands: &[&str]) -> String {
+        let Writer { language, precision, math, .. } = *self.writer;
+        self.made.functions.insert(function);
+        (language.function)(function, precision, math, operands)
+    }
+
+    /// The sine or the cosine.
+    fn wave(&mut self, function: UnaryFunction, a: &str) -> String {
+        let is_sine = function == UnaryFunction::Sin;
+        let fast = if is_sine { Operation::FastSin } else { Operation::FastCos };
+        match self.writer.own {
+            Own::Nothing => self.library(Function::Unary(function), &[a]),
+            Own::Shaders => self.operation(if is_sine { Operation::Sin } else { Operation::Cos }, a),
+            Own::FastWaves => self.operation(fast, a),
+            Own::Waves => {
+                let name = format!("{}_fast{}", self.writer.values, self.made.lines.len());
+                let value = self.operation(fast, a);
+                self.declare(self.writer.language.number(self.writer.precision), &name, &value);
+                let other = self.library(Function::Unary(function), &[a]);
+                self.pick(&format!("{name} == {name}"), &name, &other)
+            }
+        }
+    }
+
     fn binary(&mut self, op: Binary, a: &str, b: &str) -> Result<String, SourceError> {
-        let Writer { language, precision, math, own_functions, .. } = *self.writer;
+        let Writer { language, own, .. } = *self.writer;
         Ok(match op {
             Binary::Add => format!("{a} + {b}"),
             Binary::Sub => format!("{a} - {b}"),
@@ -262,13 +295,10 @@ impl State<'_> {
                 let other = self.pick(&format!("{a} == {b}"), &half, &zero);
                 self.pick(&format!("{a} {sign} {b}"), &one, &other)
             }
-            Binary::Call(BinaryFunction::Pow) if own_functions => {
+            Binary::Call(BinaryFunction::Pow) if own == Own::Shaders => {
                 self.operation(Operation::Power, &format!("{a}, {b}"))
             }
-            Binary::Call(function) => {
-                self.made.functions.insert(Function::Binary(function));
-                (language.function)(Function::Binary(function), precision, math, &[a, b])
-            }
+            Binary::Call(function) => self.library(Function::Binary(function), &[a, b]),
             Binary::And | Binary::Or | Binary::AndWeight | Binary::OrWeight => {
                 unreachable!("{op:?} is written by `join`")
             }

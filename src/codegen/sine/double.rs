@@ -11,19 +11,19 @@ use super::quadrants::{QUARTERS, Quadrants, TO_WHOLE};
 use crate::codegen::emitter::Emitter;
 
 /// The first 33 bits of π/2.
-const QUARTER: f64 = 1.57079632673412561417;
+pub(crate) const QUARTER: f64 = 1.57079632673412561417;
 /// The remaining bits of π/2.
-const QUARTER_TAIL: f64 = 6.07710050650619224932e-11;
+pub(crate) const QUARTER_TAIL: f64 = 6.07710050650619224932e-11;
 
 /// `libm` reduces an argument further if less than this part of it remains. It compares exponents, so this
 /// limit also takes some arguments that it does not reduce.
-const CANCELLED: f64 = 1.0 / 65_536.0;
+pub(crate) const CANCELLED: f64 = 1.0 / 65_536.0;
 /// Above this, the argument is near an odd multiple of π/4. `libm` knows the multiples up to the ninth to 20
 /// bits only.
-const NEXT_QUADRANT: f64 = std::f64::consts::FRAC_PI_4 - 1.0 / 65_536.0;
+pub(crate) const NEXT_QUADRANT: f64 = std::f64::consts::FRAC_PI_4 - 1.0 / 65_536.0;
 
 /// sin y = y + y³·(S₀ + y²·S₁ + …) for |y| ≤ π/4
-const SINE: [f64; 6] = [
+pub(crate) const SINE: [f64; 6] = [
     -1.66666666666666324348e-01,
     8.33333333332248946124e-03,
     -1.98412698298579493134e-04,
@@ -33,7 +33,7 @@ const SINE: [f64; 6] = [
 ];
 
 /// cos y = 1 − y²/2 + y⁴·(C₀ + y²·C₁ + …) for |y| ≤ π/4
-const COSINE: [f64; 6] = [
+pub(crate) const COSINE: [f64; 6] = [
     4.16666666666666019037e-02,
     -1.38888888888741095749e-03,
     2.48015872894767294178e-05,

@@ -9,13 +9,15 @@
 //! call. Inlined they would be no faster, but the program of a gyroid would take five times as long to
 //! compile, and meshing compiles many programs for a few cells only.
 //!
+//! Sources in C have the same operations, from the same constants, see `source::c_waves`.
+//!
 //! `double` and `single` list the arguments that they leave to `libm`, which is called for vectors that hold
 //! one of them.
 
-mod double;
+pub(crate) mod double;
 mod functions;
-mod quadrants;
-mod single;
+pub(crate) mod quadrants;
+pub(crate) mod single;
 mod wanted;
 
 pub(super) use functions::{address, define};

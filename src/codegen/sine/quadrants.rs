@@ -8,9 +8,9 @@ use crate::codegen::emitter::{ENDIANNESS, Emitter};
 
 /// 1.5 · 2⁵². Adding it to a number below 2⁵¹ rounds that to a whole number, which the last bits of the sum
 /// hold.
-pub(super) const TO_WHOLE: f64 = 1.5 / f64::EPSILON;
+pub(crate) const TO_WHOLE: f64 = 1.5 / f64::EPSILON;
 /// 2/π
-pub(super) const QUARTERS: f64 = std::f64::consts::FRAC_2_PI;
+pub(crate) const QUARTERS: f64 = std::f64::consts::FRAC_2_PI;
 
 /// Results in lanes of `f64`, before quadrants are chosen.
 pub(super) struct Quadrants {

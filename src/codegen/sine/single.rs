@@ -11,21 +11,21 @@ use super::quadrants::{QUARTERS, Quadrants, TO_WHOLE};
 use crate::codegen::emitter::Emitter;
 
 /// π/2
-const QUARTER: f64 = std::f64::consts::FRAC_PI_2;
+pub(crate) const QUARTER: f64 = std::f64::consts::FRAC_PI_2;
 /// The first 25 bits of π/2.
-const QUARTER_HEAD: f64 = 1.57079631090164184570;
+pub(crate) const QUARTER_HEAD: f64 = 1.57079631090164184570;
 /// The remaining bits of π/2.
-const QUARTER_TAIL: f64 = 1.58932547735281966916e-08;
+pub(crate) const QUARTER_TAIL: f64 = 1.58932547735281966916e-08;
 
 /// The largest argument that is reduced in one step: 9π/4 in `f32`.
-const ONE_STEP: f64 = f32::from_bits(0x40e2_31d5) as f64;
+pub(crate) const ONE_STEP: f64 = f32::from_bits(0x40e2_31d5) as f64;
 /// A little less than 2²⁸ π/2, above which `libm` reduces with more digits.
-const LARGEST: f64 = 4.0e8;
+pub(crate) const LARGEST: f64 = 4.0e8;
 /// Above this, the argument is near an odd multiple of π/4.
-const NEXT_QUADRANT: f64 = std::f64::consts::FRAC_PI_4 - 1.0 / 262_144.0;
+pub(crate) const NEXT_QUADRANT: f64 = std::f64::consts::FRAC_PI_4 - 1.0 / 262_144.0;
 
 /// sin y = y + y³·(S₀ + y²·S₁ + …) for |y| ≤ π/4
-const SINE: [f64; 4] = [
+pub(crate) const SINE: [f64; 4] = [
     -0.166666666416265235595,
     0.0083333293858894631756,
     -0.000198393348360966317347,
@@ -33,7 +33,7 @@ const SINE: [f64; 4] = [
 ];
 
 /// cos y = 1 + y²·(C₀ + y²·C₁ + …) for |y| ≤ π/4
-const COSINE: [f64; 4] = [
+pub(crate) const COSINE: [f64; 4] = [
     -0.499999997251031003120,
     0.0416666233237390631894,
     -0.00138867637746099294692,

@@ -107,6 +107,38 @@ fn solids_of_every_operation() -> Vec<Solid> {
     solids
 }
 
+/// Solids that are repeated, rounded, blended and bent: their choices follow one another, and they call functions.
+fn bent_solids() -> Vec<Solid> {
+    let text = "rfm 1\n\
+        solid repeated = sphere(0.3).repeat([1, 1, 1], [5, 5, 5])\n\
+        solid rounded = (box([-1, -1, -1], [1, 1, 1]) \\ cylinder(0.5, 3)).round(0.1)\n\
+        solid blended = blend(box(), blend(sphere(1).move([1, 0, 0]), cylinder(0.4, 2), 0.3), 0.2)\n\
+        solid twisted = (box([-0.5, -0.5, -1], [0.5, 0.5, 1]) \\ cylinder(0.2, 3)).twist(0.3).repeat([3, 0, 0], [2, 1, 1])\n\
+        solid waves = sin(30*x)*cos(3*y) + sin(3*y)*cos(3*z) + sin(3*z)*cos(30*x) <= 0.3 and sphere(2)\n\
+        solid calls = sin(exp(0.3*x) + y^1.5) + atan2(sin(z), x) + sin(t) <= 0.3 and sphere(2)\n\
+        solid tangents = tan(x) + 0.1*sin(1e5*y) <= cos(z*(2 + sin(x)))\n\
+        solid drills = any i in 0..12: box().twist(0.1*i).move([sin(i), cos(i), i/20])\n\
+        solid ripples = (sum i in 1..60: sin(i*x + y)/i + exp(-i*z^2)) <= 1\n";
+    let program = Program::from_source("bent.rfm", text).unwrap_or_else(|e| panic!("{e}"));
+    let names: Vec<String> = program.module().solids.iter().map(|solid| solid.name.clone()).collect();
+    names.iter().map(|name| program.solid_with(name, Engine::Jit).unwrap().at(0.37)).collect()
+}
+
+/// The loops that a compiler says it has vectorised.
+fn vectorised_loops(compiler: &str, text: &str) -> usize {
+    let workshop = Workshop::new();
+    workshop.write("s.c", text);
+    let (report, word) = match compiler {
+        "gcc" => ("-fopt-info-vec-optimized", "loop vectorized"),
+        _ => ("-Rpass=loop-vectorize", "vectorized loop"),
+    };
+    let mut command = std::process::Command::new(compiler);
+    command.args(library::FLAGS).args(["-c", "s.c", report]).current_dir(workshop.path());
+    let words = String::from_utf8(command.output().unwrap().stderr).unwrap();
+    let lines = words.lines().filter(|line| line.contains(word));
+    lines.filter_map(|line| line.split(':').nth(1)).collect::<std::collections::HashSet<_>>().len()
+}
+
 /// All numbers of a C library of some solids against those of their machine code.
 fn compare_c(compiler: &str, solids: &[Solid], count: usize) -> Counts {
     let workshop = Workshop::new();
@@ -142,6 +174,40 @@ fn c_of_every_operation_has_the_bits_of_rfm() {
 }
 
 #[test]
+fn c_of_bent_solids_has_the_bits_of_rfm() {
+    for compiler in compilers() {
+        let counts = compare_c(compiler, &bent_solids(), FEW);
+        assert_eq!(counts.different, 0, "{compiler}: {counts:?}");
+    }
+}
+
+#[test]
+fn loops_of_bent_solids_are_vectorised() {
+    for compiler in compilers() {
+        for solid in bent_solids().iter().filter(|solid| !["drills", "ripples"].contains(&solid.name())) {
+            let text = c_text(solid, "s");
+            let found = vectorised_loops(compiler, &text);
+            // in two precisions, four questions have a loop each, or one for sines at least and one for the rest
+            assert!(found >= 8, "{compiler}, {solid:?}: {found} loops");
+        }
+    }
+}
+
+/// sin and cos of the file itself, those of <math.h> for a few arguments only.
+#[test]
+fn sines_of_a_text_differ_from_those_of_rfm_at_few_points() {
+    let (solids, workshop) = (bent_solids(), Workshop::new());
+    let waves = solids.iter().find(|solid| solid.name() == "waves").unwrap();
+    let options = Options { math: Math::System, ..exact("s") };
+    workshop.write("s.c", source::write(waves, Target::C, &options).unwrap().text);
+    for compiler in compilers() {
+        let library = workshop.library(compiler, &["s.c"]);
+        let counts = compare(&library, "s", waves, &points(FEW, 3), Extra::default());
+        assert!(counts.different < counts.compared / 200, "{compiler}: {counts:?}");
+    }
+}
+
+#[test]
 fn c_of_random_solids_has_the_bits_of_rfm() {
     for compiler in compilers() {
         let counts = compare_c(compiler, &random_solids(5), FEW);
@@ -167,7 +233,7 @@ fn c_has_the_bits_of_rfm_at_a_million_points() {
                 counts += compare_c(compiler, some, MANY / 4);
             }
         }
-        for solids in [solids_of_every_operation(), example_solids()] {
+        for solids in [solids_of_every_operation(), example_solids(), bent_solids()] {
             counts += compare_c(compiler, &solids, MANY);
         }
         println!("{compiler}: {counts:?}");
@@ -184,6 +250,7 @@ fn c_takes_as_long_as_machine_code() {
         solids.truncate(6);
         solids.push(balls(20));
         solids.push(balls(500));
+        solids.extend(bent_solids());
         let workshop = Workshop::new();
         workshop.write("mathematics.c", mathematics());
         let mut files = vec!["mathematics.c".to_string()];
