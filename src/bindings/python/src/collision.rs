@@ -9,7 +9,7 @@ use pyo3::types::{PyList, PyTuple, PyType};
 use rfm::sph::Rebound;
 use rfm_columns::{Collisions, Column, Found, Obstacle, Particles, Vectors};
 
-use crate::evaluate::WORTH_THREADS;
+use crate::evaluate::CHEAP;
 use crate::memory::{column, columns};
 use crate::points::refuse_masked;
 use crate::pool::{Threads, in_ranges};
@@ -60,7 +60,7 @@ fn look(
     threads: Threads,
 ) -> PyResult<Vec<Found>> {
     let part = |range| particles.look(range, obstacle, rebound);
-    in_ranges(py, threads, particles.len(), WORTH_THREADS, part)
+    in_ranges(py, threads, particles.len(), CHEAP, part)
 }
 
 /// An array of shape (n, 3), or three columns.

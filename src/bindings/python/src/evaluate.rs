@@ -8,14 +8,14 @@ use rfm::solid::{Chosen, Distances};
 use rfm_columns::{Column, Job, Number};
 
 use crate::points::Points;
-use crate::pool::{CHUNK, Threads, in_ranges};
+use crate::pool::{CHUNK, Threads, Worth, in_ranges};
 use crate::results::Target;
 
-/// From this number of points on, several threads are used unless the caller states a number.
-pub const WORTH_THREADS: usize = 4 * CHUNK;
+/// Points whose answers take as long as ω does.
+pub const CHEAP: Worth = Worth { threads: 4 * CHUNK, least: 64 };
 
-/// From this number of points on, several threads find clearances: each takes as long as ω at a thousand points.
-const WORTH_THREADS_PROVEN: usize = 128;
+/// Points of which each takes as long as ω at a thousand, or at a hundred thousand.
+const COSTLY: Worth = Worth { threads: 2, least: 1 };
 
 /// Numbers that points have, as doubles and back.
 pub trait Rounded: Number + Element {
@@ -66,21 +66,21 @@ fn over<T: Number + Element, const N: usize>(
     threads: Threads,
     evaluate: impl Fn([&[T]; 3], [&mut [T]; N]) + Sync,
 ) -> PyResult<()> {
-    over_worth(py, points, results, (threads, WORTH_THREADS), evaluate)
+    over_worth(py, points, results, (threads, CHEAP), evaluate)
 }
 
-/// Calls `evaluate` for all points, on several threads from a number of points on.
+/// Calls `evaluate` for all points, on several threads where they are worth it.
 fn over_worth<T: Number + Element, const N: usize>(
     py: Python<'_>,
     points: &Points<'_, T>,
     results: [Option<Column<T>>; N],
-    (threads, worth_threads): (Threads, usize),
+    (threads, worth): (Threads, Worth),
     evaluate: impl Fn([&[T]; 3], [&mut [T]; N]) + Sync,
 ) -> PyResult<()> {
     // SAFETY: `points` keeps its arrays, the callers below keep those of the results, and `Target` sees to it
     // that results share no address with the points or with one another
     let job = unsafe { Job::new(points.count, points.columns, results) };
-    in_ranges(py, threads, job.len(), worth_threads, |range| job.run(range, &evaluate))?;
+    in_ranges(py, threads, job.len(), worth, |range| job.run(range, &evaluate))?;
     Ok(())
 }
 
@@ -207,7 +207,7 @@ impl<'py> Question<'_, 'py> {
     ) -> PyResult<Any<'py>> {
         let clearance = Target::<T, 1>::new(self.py, points, out)?;
         let distances = Distances::new(self.solid);
-        let (results, threads) = (clearance.columns.map(Some), (self.threads, WORTH_THREADS_PROVEN));
+        let (results, threads) = (clearance.columns.map(Some), (self.threads, COSTLY));
         over_worth(self.py, points, results, threads, |points, [clearance]| {
             for (i, clearance) in clearance.iter_mut().enumerate() {
                 let at = DVec3::from_array(points.map(|column| column[i].wide()));

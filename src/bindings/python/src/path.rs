@@ -13,10 +13,10 @@ use rfm::field::Entry;
 use rfm::glam::DVec3;
 
 use crate::points::{numpy, refuse_masked};
-use crate::pool::{Threads, in_ranges};
+use crate::pool::{Threads, Worth, in_ranges};
 
-/// From this number of paths on, several threads are used unless the caller states a number.
-const WORTH_THREADS: usize = 1024;
+/// A path takes as long as ω at some ten points, and through a solid of many parts a thousand times that.
+const WORTH: Worth = Worth { threads: 128, least: 8 };
 
 /// The first entries of many paths as the class `Entry`.
 pub fn first_entry<'py>(
@@ -41,7 +41,7 @@ pub fn first_entry<'py>(
     let some = |range: Range<usize>| -> Vec<Option<Entry>> {
         from[range.clone()].iter().zip(&to[range]).map(met).collect()
     };
-    let entries = in_ranges(py, threads, from.len(), WORTH_THREADS, some)?.concat();
+    let entries = in_ranges(py, threads, from.len(), WORTH, some)?.concat();
     let normal = |entry: &Entry| entry.normals.mean().unwrap_or(DVec3::ZERO);
     let part = PyArray1::from_iter(py, entries.iter().map(|e| e.map_or(f64::NAN, |e| e.t)));
     let point = vectors(py, &entries, |entry| entry.point)?.call_method1("reshape", (&shape,))?;

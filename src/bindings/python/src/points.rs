@@ -8,7 +8,7 @@ use pyo3::PyTypeInfo;
 use pyo3::exceptions::{PyTypeError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::sync::PyOnceLock;
-use pyo3::types::{PyFloat, PyInt, PyModule, PyTuple};
+use pyo3::types::{PyFloat, PyInt, PyList, PyModule, PyTuple};
 use rfm::geom::Aabb;
 use rfm::glam::DVec3;
 use rfm::solid::Lane;
@@ -84,12 +84,27 @@ fn is_number(given: &Bound<'_, PyAny>) -> bool {
     given.is_instance_of::<PyFloat>() || given.is_instance_of::<PyInt>()
 }
 
-/// Refuses an array some of whose elements are masked: its memory has numbers for them that mean nothing.
+/// Lists that hold one another more often than this are no array: NumPy has at most 64 dimensions.
+const DEEPEST: usize = 64;
+
+/// Refuses an array some of whose elements are masked, alone or in lists: its memory has numbers for them that
+/// mean nothing.
 ///
 /// # Errors
 /// `ValueError` for such an array.
 pub fn refuse_masked(given: &Bound<'_, PyAny>) -> PyResult<()> {
+    refuse_masked_within(given, DEEPEST)
+}
+
+/// Likewise, in lists that hold one another so many times.
+fn refuse_masked_within(given: &Bound<'_, PyAny>, depth: usize) -> PyResult<()> {
     let py = given.py();
+    if given.is_instance_of::<PyList>() || given.is_instance_of::<PyTuple>() {
+        if depth == 0 {
+            return Ok(()); // NumPy makes no array of it
+        }
+        return given.try_iter()?.try_for_each(|item| refuse_masked_within(&item?, depth - 1));
+    }
     if given.get_type().is(PyUntypedArray::type_object(py)) || is_number(given) {
         return Ok(()); // nearly all, at the price of a comparison
     }

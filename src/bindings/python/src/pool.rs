@@ -24,8 +24,15 @@ pub const LOOK: Duration = Duration::from_millis(50);
 /// Items that one thread takes at a time.
 pub const CHUNK: usize = 8192;
 
-/// Below this many items, Python's lock is kept: to release it takes as long as some items do.
-pub const WORTH_RELEASING: usize = 64;
+/// How many items make it worth to do more than to go through them.
+#[derive(Debug, Clone, Copy)]
+pub struct Worth {
+    /// Several threads are used from this number of items on, if the caller states none.
+    pub threads: usize,
+    /// Below this many items, Python's lock is kept and no thread takes fewer: to release the lock takes as long as some
+    /// items do.
+    pub least: usize,
+}
 
 struct Pools {
     /// The process that the pools belong to; 0 before the first one is made.
@@ -167,24 +174,24 @@ pub fn run_watched<R: Send + 'static>(
 /// Does some work for ranges that together are `0..count`, on the caller's thread or, if the work is worth it, on
 /// those of a pool, with Python's lock released and looks for Ctrl-C in between. Returns the results in order.
 ///
-/// `worth_threads` is the number of items from which several threads are used if the caller states none.
-///
 /// # Errors
 /// `KeyboardInterrupt`, or whatever else a handler of signals raises; then a part of the work has been done.
 pub fn in_ranges<R: Send>(
     py: Python<'_>,
     threads: Threads,
     count: usize,
-    worth_threads: usize,
+    worth: Worth,
     work: impl Fn(Range<usize>) -> R + Sync,
 ) -> PyResult<Vec<R>> {
-    if count < WORTH_RELEASING {
+    if count < worth.least {
         return Ok(vec![work(0..count)]);
     }
-    let alone = threads.is_one() || (threads == Threads::Auto && count < worth_threads);
+    let alone = threads.is_one() || (threads == Threads::Auto && count < worth.threads);
     let pool = if alone { None } else { Some(pool(py, threads)?) };
     let mut results = Vec::new();
-    let (mut begin, mut size) = (0, WORTH_RELEASING);
+    // items may take longer than the time between looks: each thread has some all the same
+    let fewest = worth.least * pool.as_ref().map_or(1, |pool| pool.current_num_threads());
+    let (mut begin, mut size) = (0, worth.least);
     while begin < count {
         let range = begin..count.min(begin.saturating_add(size));
         let mut spent = Duration::ZERO;
@@ -192,9 +199,9 @@ pub fn in_ranges<R: Send>(
         py.detach(|| {
             let begun = Instant::now();
             match &pool {
-                Some(pool) if range.len() > WORTH_RELEASING => {
+                Some(pool) if range.len() > worth.least => {
                     let chunk =
-                        range.len().div_ceil(4 * pool.current_num_threads()).clamp(WORTH_RELEASING, CHUNK);
+                        range.len().div_ceil(4 * pool.current_num_threads()).clamp(worth.least, CHUNK);
                     let parts = range.len().div_ceil(chunk);
                     let part = |part: usize| {
                         let from = range.start + part * chunk;
@@ -211,9 +218,10 @@ pub fn in_ranges<R: Send>(
         size = match spent {
             spent if spent < LOOK / 16 => size.saturating_mul(8),
             spent if spent < LOOK / 2 => size.saturating_mul(2),
-            spent if spent > 2 * LOOK => (size / 4).max(WORTH_RELEASING),
+            spent if spent > 2 * LOOK => size / 4,
             _ => size,
         };
+        size = size.max(fewest);
         py.check_signals()?;
     }
     Ok(results)

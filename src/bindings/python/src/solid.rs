@@ -370,7 +370,8 @@ impl PySolid {
             threads,
             |p| {
                 no_out(out)?;
-                Ok(self.solid.distance(p).clearance.into_pyobject(points.py())?.into_any())
+                let py = points.py();
+                Ok(py.detach(|| self.solid.distance(p).clearance).into_pyobject(py)?.into_any())
             },
             |question, columns| question.clearance(&columns, out)
         )

@@ -74,12 +74,23 @@ def test_masked_elements_are_refused():
     for question in (
         lambda: ball.omega(masked),
         lambda: ball.contact(column, 0.0, 0.0),
+        lambda: ball.omega([masked[0], [0.0, 0.0, 0.0]]),
+        lambda: ball.omega([0.0, np.ma.masked, 0.0]),
+        lambda: ball.clearance([(masked[1], masked[2])]),
         lambda: ball.first_entry(masked, np.ones((3, 3))),
         lambda: ball.collide(masked, np.zeros((3, 3)), reach=1.0),
         lambda: ball.collide(np.zeros((3, 3)), masked, reach=1.0),
     ):
         with pytest.raises(ValueError, match="masked elements"):
             question()
+
+
+def test_lists_that_hold_themselves_are_refused():
+    ball = rfm.load("rfm 1\nsolid s = sphere(1)")["s"]
+    endless = []
+    endless.append(endless)
+    with pytest.raises((ValueError, TypeError, RecursionError)):
+        ball.omega(endless)
 
 
 def test_a_text_names_other_files_if_it_stands_for_one(tmp_path):

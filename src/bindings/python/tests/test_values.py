@@ -256,6 +256,8 @@ def test_velocities_and_clearances_are_those_at_single_points(dtype):
     ball = rfm.load("rfm 1\nsolid s = sphere(1)")["s"]
     out = np.empty(300, dtype)
     assert ball.clearance(points, out=out) is out
+    for count, threads in [(0, None), (1, 2), (2, None), (5, None), (300, 1), (300, 2)]:
+        assert same(ball.clearance(points[:count], threads=threads), out[:count])
     distance = np.abs(np.linalg.norm(points.astype("f8"), axis=1) - 1)
     assert (out <= distance).all() and (out > distance * 0.99 - 1e-6).all()
     assert ball.clearance(*points[0].tolist()) == pytest.approx(out[0], rel=1e-6)
