@@ -301,7 +301,12 @@ impl BinaryFunction {
             }
             // a fixed power, which grows with |a|
             Self::Pow if b.lo == b.hi && b.lo > 0.0 && (b.lo.fract() == 0.0 || a.lo >= 0.0) => {
-                let at = |a: f64| libm::pow(a, b.lo);
+                // powers of small numbers are small, and not 0
+                let outward = |power: f64, a: f64| match power == 0.0 && a != 0.0 {
+                    true => f64::from_bits(1).copysign(power),
+                    false => power,
+                };
+                let at = |a: f64| outward(libm::pow(a, b.lo), a);
                 let is_even = b.lo % 2.0 == 0.0;
                 let range = if is_even && a.contains(0.0) {
                     Interval::new(0.0, at(a.lo).max(at(a.hi)))

@@ -9,11 +9,11 @@ use crate::ir::graph::{Expr, Graph, Node};
 use crate::ir::op::{Binary, Unary};
 
 impl Graph {
-    /// The graph with each use of a constant replaced by a parameter of its own; and the constants. Exponents stay, because
-    /// what is known of a power depends on whether they are whole. Nodes are in the order of a walk from the root,
-    /// operands first, so that graphs of one shape give the same result here, whatever else is in the graph they come
-    /// from and whichever of their constants happen to be equal. Nor do the signs of constants matter: differences with a
-    /// number or with its product become sums.
+    /// The graph with each use of a constant replaced by a parameter of its own; and the constants. An exponent of 0 stays,
+    /// because a power needs its base with all others. Nodes are in the order of a walk from the root, operands first, so
+    /// that graphs of one shape give the same result here, whatever else is in the graph they come from and whichever of
+    /// their constants happen to be equal. Nor do the signs of constants matter: differences with a number or with its
+    /// product become sums.
     pub fn parametrised(&self, root: Node) -> (Self, Node, Vec<f64>) {
         let mut walk = Parametrisation {
             graph: self,
@@ -125,11 +125,11 @@ impl Parametrisation<'_> {
         match term {
             SignedTerm::Plain(Expr::Constant(bits)) => self.parameter(f64::from_bits(bits), span),
             SignedTerm::Plain(Expr::Binary(op @ Binary::Call(BinaryFunction::Pow), a, b))
-                if let Some(exponent) = self.graph.as_constant(b) =>
+                if self.graph.as_constant(b) == Some(0.0) =>
             {
                 let a = self.operand(a, span);
-                let exponent = self.out.constant(exponent);
-                self.out.intern(Expr::Binary(op, a, exponent), span)
+                let none = self.out.constant(0.0);
+                self.out.intern(Expr::Binary(op, a, none), span)
             }
             SignedTerm::Plain(expr) => {
                 let mapped = expr.map(|operand| self.operand(operand, span));

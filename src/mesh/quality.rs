@@ -44,8 +44,9 @@ pub struct Quality {
     pub from_surface: Distances,
     /// The angle between a triangle and the surface below its middle, in degrees.
     pub normal_error: Distances,
-    /// The volume over that of the solid, less 1. The latter is extrapolated from dual contouring in these cells and in
-    /// cells half as large, whose error is a quarter of that (Richardson 1911).
+    /// The volume over that of the solid, less 1. The latter is extrapolated from dual contouring in the grid's cells and
+    /// in cells half as large, whose error is a quarter of that (Richardson 1911). Where there are no such cells, or the
+    /// meshes differ by more than a tenth, that of the finer mesh stands for it.
     pub volume_error: f64,
     /// The area over that of the solid, less 1, found in the same way.
     pub area_error: f64,
@@ -110,6 +111,9 @@ const NO_DIRECTION: f64 = 1e-6;
 /// The part that making the finer mesh takes of the time for a [`Reference`], for the progress of it.
 const MESHING: f64 = 0.8;
 
+/// Meshes whose volumes or areas differ by more than this part of them do not show the same solid.
+const ALIKE: f64 = 0.1;
+
 /// The part of that for the mesh in the grid's own cells.
 const COARSER: f64 = 0.2;
 
@@ -131,7 +135,7 @@ impl<'a> Reference<'a> {
     /// parts of unlike scale would mislead it.
     ///
     /// # Errors
-    /// Those of [`dual_contouring`] in the finer grid that gives points of the surface, also if the watch ends the work
+    /// Those of [`dual_contouring`] in this grid and in the finer one that gives points of the surface, also if the watch ends the work
     /// on these points.
     pub fn new(
         field: &dyn Field,
@@ -140,6 +144,10 @@ impl<'a> Reference<'a> {
         watch: &dyn Watch,
     ) -> Result<Self, MeshError> {
         let finer = Grid::filling(grid.bounds(), Resolution::Spacing(0.5 * grid.spacing().min_element()));
+        // sides that are no multiples of a cell may have one more
+        let is_half = |(count, own): (usize, usize)| count.abs_diff(2 * own) <= 1.max(own / 16);
+        let is_halved =
+            finer.as_ref().is_ok_and(|finer| finer.cells().into_iter().zip(grid.cells()).all(is_half));
         let meshing = Stretch { watch, from: 0.0, to: MESHING };
         let [first, rest] =
             [(0.0, COARSER), (COARSER, 1.0)].map(|(from, to)| Stretch { watch: &meshing, from, to });
@@ -148,8 +156,11 @@ impl<'a> Reference<'a> {
         let moving = Stretch { watch, from: MESHING, to: 1.0 };
         let points = surface_points(&finer, distance, grid, &moving).ok_or(MeshError::Ended)?;
         let finer = extent(&finer);
-        // the error goes with the square of the cells
-        let limit = |coarser: f64, finer: f64| finer + (finer - coarser) / 3.0;
+        // the error goes with the square of the cells, unless they are too large for a part of the solid
+        let limit = |coarser: f64, finer: f64| {
+            let is_resolved = (finer - coarser).abs() <= ALIKE * finer;
+            if is_halved && is_resolved { finer + (finer - coarser) / 3.0 } else { finer }
+        };
         Ok(Self { distance, points, extent: (limit(coarser.0, finer.0), limit(coarser.1, finer.1)) })
     }
 

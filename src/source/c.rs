@@ -17,17 +17,13 @@ use crate::precision::Precision;
 const LONGEST_FUNCTION: usize = 1500;
 
 /// gcc takes the choices of one result after the other for partly redundant and moves them into branches, which it then
-/// does not vectorise. Clang does not.
-const LEFT_WHOLE: [&str; 4] = [
+/// does not vectorise. Clang does not. Functions with options of their own are not inlined into those without, so a header leaves
+/// that to the command.
+const LEFT_WHOLE: [&str; 3] = [
     "#if defined(__GNUC__) && !defined(__clang__)",
-    "#pragma GCC push_options",
     "#pragma GCC optimize (\"no-tree-pre\") /* choices stay choices, and loops are vectorised */",
     "#endif",
 ];
-
-/// After it, the options of the command hold again: for what follows a header.
-const RESTORED: [&str; 3] =
-    ["#if defined(__GNUC__) && !defined(__clang__)", "#pragma GCC pop_options", "#endif"];
 
 /// The kinds of files.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -56,8 +52,12 @@ pub(super) fn source(file: &File<'_>, flavour: Flavour) -> Result<String, Source
     let writer = CFile { file, flavour };
     let mut lines = writer.head();
     lines.extend(writer.macros());
-    if flavour != Flavour::Cuda {
-        lines.extend(LEFT_WHOLE.map(String::from));
+    match flavour {
+        Flavour::Unit => lines.extend(LEFT_WHOLE.map(String::from)),
+        Flavour::Header => {
+            lines.push("/* gcc vectorises loops over points if it is called with -fno-tree-pre */".into())
+        }
+        Flavour::Cuda => {}
     }
     lines.extend(writer.params());
     if flavour == Flavour::Unit {
@@ -87,10 +87,6 @@ pub(super) fn source(file: &File<'_>, flavour: Flavour) -> Result<String, Source
     lines.extend(writer.library(&called));
     lines.extend(writer.operations(&operations));
     lines.extend(functions);
-    if flavour == Flavour::Header {
-        lines.push(String::new());
-        lines.extend(RESTORED.map(String::from));
-    }
     if flavour != Flavour::Unit {
         lines.push(String::new());
         lines.push("#endif".into());
@@ -188,10 +184,16 @@ impl CFile<'_> {
             lines.extend([format!("#ifndef {guard}"), format!("#define {guard}")]);
         }
         lines.extend(
-            ["#include <math.h>", "#include <stddef.h>", "#include <stdlib.h>", ""].map(String::from),
+            ["#include <float.h>", "#include <math.h>", "#include <stddef.h>", "#include <stdlib.h>", ""]
+                .map(String::from),
         );
         let fast = "#error \"compile without -ffast-math: it breaks signs and NaN\"";
-        lines.extend(["#ifdef __FAST_MATH__", fast, "#endif"].map(String::from));
+        let is_fast = "#if defined(__FAST_MATH__) || defined(_M_FP_FAST) || __FINITE_MATH_ONLY__ + 0 > 0";
+        lines.extend([is_fast, fast, "#endif"].map(String::from));
+        let wide = "#error \"compile with -msse2 -mfpmath=sse: wider arithmetic rounds otherwise\"";
+        lines.extend(
+            ["#if FLT_EVAL_METHOD + 0 == 1 || FLT_EVAL_METHOD + 0 == 2", wide, "#endif"].map(String::from),
+        );
         if self.flavour == Flavour::Cuda {
             let plain = ["#ifndef __CUDACC__", "#define __host__", "#define __device__", "#endif"];
             lines.extend(plain.map(String::from));

@@ -28,16 +28,16 @@ sine = y + pick(multiple == {0}, plain, exact)
 cosine_low = z * ({c0} + z * ({c1} + z * {c2}))
 q = cosine_low + w * w * ({c3} + z * ({c4} + z * {c5}))
 half = z * {0.5}
-near = {1} - half
-cosine = near + ((({1} - near) - half) + (z * q - y * tail))
+one_less_half = {1} - half
+cosine = one_less_half + ((({1} - one_less_half) - half) + (z * q - y * tail))
 ";
 
 /// In `f32`: large arguments are reduced in two steps.
 const SINGLE_REDUCED: &str = "x = abs(u)
 multiple = (x * {quarters} + {to_whole}) - {to_whole}
-near = x - multiple * {quarter}
-far = (x - multiple * {quarter_head}) - multiple * {quarter_tail}
-y = pick(x <= {one_step}, near, far)
+in_one_step = x - multiple * {quarter}
+in_two_steps = (x - multiple * {quarter_head}) - multiple * {quarter_tail}
+y = pick(x <= {one_step}, in_one_step, in_two_steps)
 is_rare? = !(abs(y) <= {next_quadrant}) | (x > {largest})
 z = y * y
 w = z * z

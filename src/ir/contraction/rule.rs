@@ -63,9 +63,11 @@ impl Rule {
     /// has a value: 1^y is 1 even if y is not a number.
     pub fn needed(self, graph: &Graph) -> impl Iterator<Item = Node> {
         let never = |node: Node, number: f64| graph.as_constant(node).is_some_and(|c| c != number);
+        // a constant exponent of 0 is made no parameter
+        let is_given = |node: Node| matches!(graph.expr(node), Expr::Parameter(_));
         let (needs_first, needs_second) = match self {
             Self::Plain(Expr::Binary(op, a, b)) => match op {
-                Binary::Call(BinaryFunction::Pow) => (never(b, 0.0), never(a, 1.0)),
+                Binary::Call(BinaryFunction::Pow) => (never(b, 0.0) || is_given(b), never(a, 1.0)),
                 Binary::DivOrZero | Binary::MulOrZero => (false, true),
                 Binary::MinWeight
                 | Binary::MaxWeight

@@ -18,8 +18,8 @@ const FARTHEST: f64 = 2e77;
 /// below 1e-299; in single precision below 1e-29.
 const FACTORS: Interval = Interval { lo: 1e-9, hi: 1e9 };
 
-/// A factor that varies is at least this part of its largest value and of the constants in its formula: the errors of
-/// single precision are a hundredth of that, so the factor is positive in it, too.
+/// A factor that varies is at least this part of its largest value and of the constants in its formula. The errors of a
+/// few operations on such numbers in single precision are a hundredth of that, so the factor is positive in it, too.
 const LEAST_PART: f64 = 128.0 * f32::EPSILON as f64;
 
 /// How the sign of a node follows from its operands.
@@ -145,12 +145,11 @@ mod tests {
             let waving = graph.binary(Binary::Mul, x, level);
             assert_eq!(SignRule::of(&graph, waving) == SignRule::Same(x), is_positive, "{factor}");
         }
-        // it may become so small that the product is 0 before x is
         let thin = graph.binary(Binary::Add, small, within);
-        // it may be 0, or as large as its coordinates
         // 1 − 0.99999999 is 1e-8, but 0 in single precision
         let most = graph.binary(Binary::Mul, most, within);
         let sharp = graph.binary(Binary::Add, one, most);
+        // a factor may be 0, as large as its coordinates, or so small that the product is 0 before x is
         for factor in [within, z, part, thin, sharp] {
             let product = graph.binary(Binary::Mul, x, factor);
             assert_eq!(SignRule::of(&graph, product), SignRule::Leaf);

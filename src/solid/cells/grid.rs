@@ -28,7 +28,7 @@ pub const SIDE: u32 = 1 << DEPTH;
 /// distances: these need every leaf.
 const FEW_LEAVES: usize = 4;
 
-/// The same for maps of signs alone. A batch of points costs 0.2 ns for each leaf, a range some 50: outlines of
+/// The same for maps of signs alone of a solid at rest. A batch of points costs 0.2 ns for each leaf, a range some 50: outlines of
 /// hundreds of corners are meshed six times faster than with [`FEW_LEAVES`], balls and gears as fast.
 const FEW_FOR_SIGNS: usize = 16;
 
@@ -148,7 +148,7 @@ impl Pending {
 }
 
 impl Cells {
-    /// Divides a box for a map with a reach, or with a reach of 0 for signs alone; `margin` is positive.
+    /// Divides a box for a map with a reach, or with a reach of 0 for signs alone. `margin` is positive.
     pub fn new(parts: &LeafTree, domain: Aabb, margin: f64, reach: f64) -> Self {
         let few_leaves = if reach > 0.0 { FEW_LEAVES } else { FEW_FOR_SIGNS };
         let (mut cells, level) = Self::begin(parts, domain, margin);
@@ -315,7 +315,7 @@ pub(super) fn octant(at: UVec3, k: usize) -> UVec3 {
 }
 
 /// Whether a cell of a moving solid's map is not divided further, see [`is_final`].
-pub(super) fn is_final_for_distances(depth: u32, leaves: usize, in_vain: u32) -> bool {
+pub(super) fn is_final_in_motion(depth: u32, leaves: usize, in_vain: u32) -> bool {
     is_final(depth, (leaves, FEW_LEAVES), in_vain)
 }
 

@@ -12,9 +12,7 @@ use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
 use glam::UVec3;
 
-use super::grid::{
-    Counts, DEPTH, Pending, RESTLESS_DEPTH, SIDE, bounds, is_final_for_distances, judged, octant,
-};
+use super::grid::{Counts, DEPTH, Pending, RESTLESS_DEPTH, SIDE, bounds, is_final_in_motion, judged, octant};
 use crate::geom::Aabb;
 use crate::solid::leaves::leaf_set::LeafTree;
 use crate::solid::leaves::pruning::Verdict;
@@ -206,7 +204,7 @@ impl Restless {
         };
         let count = leaf_count(&words);
         let in_vain = if count < parent.count { 0 } else { parent.in_vain + 1 };
-        if is_final_for_distances(depth, count, in_vain) {
+        if is_final_in_motion(depth, count, in_vain) {
             let (tree, number) = self.trees.kept(words);
             Node::Near(tree, number)
         } else {

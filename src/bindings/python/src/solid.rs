@@ -349,7 +349,7 @@ impl PySolid {
     /// points : array of shape (..., 3), m; or x, y, z : arrays that broadcast together, or numbers
     /// out : array of shape (...), optional
     /// threads : int, optional
-    ///     If it is not stated, all are used from 128 points on.
+    ///     If it is not stated, all are used from three points on.
     ///
     /// Returns
     /// -------

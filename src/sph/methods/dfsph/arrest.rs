@@ -5,19 +5,24 @@
 //! column falls into the gaps that seem to open beside them. Displacements put the layers back in each step, but their
 //! velocities stayed and grew: the fluid fell as if there was no floor, and had twice its energy after 55 steps.
 //!
-//! So what displaces particles whose places the motion of the step compresses acts on velocities, too: Δv = b(c·s′)/dt,
-//! where c is 1 for these particles and 0 for the others. Displacements are the adjoint of that rate of compression, so
-//! this takes kinetic energy away. As a sum over pairs it keeps momentum and angular momentum. It is shortened where it
-//! would overshoot.
+//! So what answers to the motion of the step acts on velocities, too: Δv = b(c·s′)/dt, where c is the part of the excess of
+//! density that this motion makes within some steps, and 0 where it expands the places. Displacements are the adjoint of
+//! that rate of compression, so this takes kinetic energy away. As a sum over pairs it keeps momentum and angular
+//! momentum. All of it is shortened by one factor if it would overshoot.
+
+use rayon::prelude::*;
 
 use super::solver::Solver;
 use super::walls::Walls;
 use crate::sph::{
     core::Core,
-    particles::{Vectors, add_scaled},
+    particles::{CHUNK, Vectors, add_scaled},
     reaction::Reaction,
     walls::Pushed,
 };
+
+/// Steps in which the same motion has made an excess that solves have left: as many as a debt lasts.
+const LASTING: f64 = 8.0;
 
 /// What is taken from the velocities in a step.
 #[derive(Default)]
@@ -34,15 +39,10 @@ impl Arrest {
     pub fn find(&mut self, core: &Core, (places, walls): (&Solver, &Walls), excess: &[f64], density: &[f64]) {
         let rest = core.parameters.rest_density;
         self.s.clear();
-        let is_compressed = |excess: f64, density: f64| excess > density - rest;
-        self.s.extend(
-            places
-                .s
-                .iter()
-                .zip(excess)
-                .zip(density)
-                .map(|((s, excess), density)| if is_compressed(*excess, *density) { *s } else { 0.0 }),
-        );
+        self.s.extend(places.s.iter().zip(excess).zip(density).map(|((s, excess), density)| {
+            let by_motion = excess - (density - rest);
+            if by_motion > 0.0 { s * (LASTING * by_motion / excess.max(by_motion)).min(1.0) } else { 0.0 }
+        }));
         self.undone.resize(self.s.len());
         places.find_push_of(core, walls, &self.s, &mut self.undone);
     }
@@ -71,12 +71,12 @@ impl Arrest {
     /// Notes what walls do of it.
     fn note_walls(&self, core: &Core, walls: &Walls, part: f64, dt: f64) {
         let Some(reaction) = Reaction::of(core, dt) else { return };
-        for (i, (wall, _)) in walls.found() {
+        walls.found().par_iter().with_min_len(CHUNK / 4).for_each(|(i, (wall, _))| {
             let i = *i as usize;
             let factor = -core.parameters.rest_density * self.s[i] * part / (dt * dt);
             let by_pressure = factor * wall.barrier.gradient;
             reaction.add(i, Pushed { by_pressure, factor, gradient: wall.gradient, ..Pushed::default() });
-        }
+        });
     }
 
     /// Memory, bytes.
