@@ -116,6 +116,20 @@ fn a_longer_run_goes_on_from_the_end_of_a_shorter() {
     assert!(pvd.contains(r#"timestep="0.05""#), "{pvd}");
 }
 
+/// 3·0.05 is 0.15000000000000002: a run that ends at 0.15 ends at the third frame, and not a rounding before it.
+#[test]
+fn a_run_that_ends_at_a_frame_goes_on_as_if_it_had_not() {
+    for method in ["wcsph", "dfsph"] {
+        let folder = tempfile::tempdir().unwrap();
+        let here = folder.path();
+        std::fs::write(here.join("drop.rfm"), scene(method, "until: 0.25 s, save_every: 50 ms")).unwrap();
+        run(here, &["straight"]).expect(0);
+        run(here, &["broken", "--until", "0.15"]).expect(0);
+        run(here, &["broken", "--resume"]).expect(0);
+        assert_same_results(&here.join("straight"), &here.join("broken"));
+    }
+}
+
 #[test]
 fn damaged_and_foreign_checkpoints() {
     let folder = tempfile::tempdir().unwrap();

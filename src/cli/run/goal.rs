@@ -32,9 +32,10 @@ impl Goal {
                 Err(Failure::usage(format!("--until {until}: expected a time in seconds")))
             }
             (None, until) => {
-                let until = until.unwrap_or(experiment.scene().run.until);
+                let run = &experiment.scene().run;
+                let until = until.unwrap_or(run.until);
                 Ok(if experiment.parameters().adaptive {
-                    Self::Time(until)
+                    Self::Time(frame_within_rounding(until, run.save_every))
                 } else {
                     Self::Steps((until / experiment.parameters().time_step).round() as u64)
                 })
@@ -47,7 +48,7 @@ impl Goal {
         let (time, steps) = (short_time(begin.time), begin.steps);
         let asked = match (options.steps, options.until) {
             (Some(asked), _) if asked < steps => format!("--steps {asked}"),
-            (None, Some(asked)) if asked < begin.time * (1.0 - 1e-12) => format!("--until {asked}"),
+            (None, Some(asked)) if asked < begin.time * (1.0 - ROUNDING) => format!("--until {asked}"),
             _ => return Ok(()),
         };
         Err(Failure::usage(format!(
@@ -60,7 +61,7 @@ impl Goal {
     pub fn is_reached(self, simulation: &Simulation) -> bool {
         match self {
             Self::Steps(steps) => simulation.steps() >= steps,
-            Self::Time(end) => simulation.time() >= end * (1.0 - 1e-12),
+            Self::Time(end) => simulation.time() >= end * (1.0 - ROUNDING),
         }
     }
 
@@ -96,8 +97,8 @@ impl Goal {
         };
         // runs arrive at their frames within rounding errors
         let every = experiment.scene().run.save_every;
-        let all = (end / every * (1.0 - 1e-12)).ceil();
-        (all - (begin.time / every * (1.0 + 1e-12)).floor()).max(0.0) as u64
+        let all = (end / every * (1.0 - ROUNDING)).ceil();
+        (all - (begin.time / every * (1.0 + ROUNDING)).floor()).max(0.0) as u64
     }
 
     /// Number of steps from a beginning, if each has this length, s.
@@ -107,6 +108,16 @@ impl Goal {
             Self::Time(end) => ((end - begin.time) / dt).ceil() as u64,
         }
     }
+}
+
+/// A frame is meant by a time this part of it earlier or later: 3·0.05 is 0.15000000000000002, and not 0.15.
+const ROUNDING: f64 = 1e-12;
+
+/// A time, s, or that of the frame which is meant by it. A run that ends at a frame takes the same last step
+/// as one that goes on from there.
+fn frame_within_rounding(time: f64, every: f64) -> f64 {
+    let frame = every * (time / every).round();
+    if (frame - time).abs() <= ROUNDING * time { frame } else { time }
 }
 
 /// When frames are saved: after a number of equal steps, or at instants that steps are fitted to.
@@ -120,7 +131,7 @@ impl Pace {
     pub fn new(experiment: &Experiment, time: f64) -> Self {
         let every = experiment.scene().run.save_every;
         if experiment.parameters().adaptive {
-            Self::Times { every, next: 1 + (time / every * (1.0 + 1e-12)) as u64 }
+            Self::Times { every, next: 1 + (time / every * (1.0 + ROUNDING)) as u64 }
         } else {
             Self::Steps(((every / experiment.parameters().time_step).round() as u64).max(1))
         }
@@ -139,10 +150,27 @@ impl Pace {
         match self {
             Self::Steps(steps) => simulation.steps().is_multiple_of(*steps),
             Self::Times { every, next } => {
-                let due = simulation.time() >= *every * *next as f64 * (1.0 - 1e-12);
+                let due = simulation.time() >= *every * *next as f64 * (1.0 - ROUNDING);
                 *next += u64::from(due);
                 due
             }
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_end_at_a_frame_is_the_time_of_the_frame() {
+        let differing = (1..200).filter(|k| {
+            let (written, frame) = (f64::from(5 * k) / 100.0, 0.05 * f64::from(*k));
+            assert_eq!(frame_within_rounding(written, 0.05), frame);
+            written != frame
+        });
+        assert!(differing.count() > 10);
+        assert_eq!(frame_within_rounding(0.15, 0.04), 0.15);
+        assert_eq!(frame_within_rounding(0.0, 0.04), 0.0);
     }
 }
