@@ -440,7 +440,7 @@ fn precision() -> impl TypedValueParser<Value = Precision> {
 #[derive(Debug, Args)]
 pub(super) struct Explain {
     /// The code of a message (E0201), `codes` for a list of them; a word of the language or a key of a scene (twist, spacing),
-    /// `words` for all of them; or a file, FILE:SOLID or FILE:SCENE
+    /// `words` for all of them; `outputs` for what a run writes, or a key of its summary; or a file, FILE:SOLID or FILE:SCENE
     #[arg(value_name = "CODE|WORD|FILE[:NAME]", required_unless_present = "methods")]
     pub subject: Option<String>,
     /// List the methods of the fluid solver, with the keys, units, defaults and passes of each, as Markdown

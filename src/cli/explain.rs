@@ -5,7 +5,7 @@ use std::path::Path;
 use glam::DVec3;
 
 use super::args::{Explain, Stage};
-use super::language::{page, words::is_of_a_word};
+use super::language::{outputs, page, words::is_of_a_word};
 use super::output::sound_speed;
 use super::run::{experiment, start};
 use super::shared::Shared;
@@ -54,7 +54,11 @@ pub(super) fn run(shared: &Shared, options: &Explain) -> Result<(), Failure> {
             say!("{}", page::all().trim_end());
             return Ok(());
         }
-        if let Some(text) = page::of(subject) {
+        if subject == "outputs" {
+            say!("{}", outputs::all().trim_end());
+            return Ok(());
+        }
+        if let Some(text) = page::of(subject).or_else(|| outputs::of(subject)) {
             say!("{}", text.trim_end());
             return Ok(());
         }

@@ -2,11 +2,12 @@
 
 use crate::tool::{rfm, rfm_reading, root};
 
-const DOCUMENTS: [&str; 13] = [
+const DOCUMENTS: [&str; 14] = [
     "README.md",
     "CHANGELOG.md",
     "grammar/README.md",
     "grammar/words.md",
+    "grammar/outputs.md",
     "examples/README.md",
     "examples/lammps/README.md",
     "examples/validation/README.md",
@@ -214,6 +215,14 @@ fn the_words_are_listed_as_they_are_declared() {
     assert!(one.starts_with("- `twist(shape, turns)`: ") && one.contains("`shape.twist(turns)`"), "{one}");
     let unknown = rfm(root(), &["explain", "twisst"]).expect(2);
     assert!(unknown.stderr.contains("did you mean `twist`?"), "{}", unknown.stderr);
+}
+
+#[test]
+fn what_a_run_writes_is_listed_as_it_is_described() {
+    let page = rfm(root(), &["explain", "outputs"]).expect(0).stdout;
+    assert_eq!(page, text("grammar/outputs.md"), "write the output of `rfm explain outputs` there");
+    let one = rfm(root(), &["explain", "energy_excess"]).expect(0).stdout;
+    assert!(one.starts_with("- `energy_excess` (part of the greatest energy): "), "{one}");
 }
 
 #[test]

@@ -39,6 +39,7 @@ mod mistakes;
 mod moving;
 mod mutations;
 mod numbers;
+mod outputs;
 mod param_sweeps;
 mod params;
 mod pictures;

@@ -1,5 +1,6 @@
 //! What the words of the language mean, as editors and `rfm explain` show it.
 
 pub(super) mod keys;
+pub(super) mod outputs;
 pub(super) mod page;
 pub(super) mod words;
