@@ -23,6 +23,11 @@ pub fn to_thousandths(p: DVec3) -> DVec3 {
     }))
 }
 
+/// A number to print with six digits; a zero without a sign.
+pub fn significant(x: f64) -> f64 {
+    format!("{x:.5e}").parse().unwrap_or(x) + 0.0
+}
+
 /// Larger numbers are printed as they are: there thousandths are near the last digit.
 const LARGEST_WITH_THOUSANDTHS: f64 = 1e12;
 
@@ -164,6 +169,11 @@ mod tests {
         assert_eq!(shown(-0.000_6, 1.234_56, -7.0), "[-0.001, 1.235, -7.000]");
         let large = DVec3::new(1e300, f64::INFINITY, -1e13);
         assert_eq!(to_thousandths(large), large);
+    }
+
+    #[test]
+    fn printed_numbers_have_six_digits() {
+        assert_eq!([1.008_446_477_162_621_8, -0.0, 1e-30].map(significant), [1.008_45, 0.0, 1e-30]);
     }
 
     #[test]

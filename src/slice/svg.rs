@@ -70,17 +70,27 @@ pub fn drawing(field: &dyn Field, name: &str, samples: &Samples, style: Style, i
         samples.plane,
         TOP - 16.0
     );
-    bands_and_lines(&mut out, field, samples, &frame, &scale);
+    let labels = bands_and_lines(&mut out, field, samples, &frame, &scale);
     undefined_cells(&mut out, samples, &frame, id);
     if style.arrows {
         arrows::draw(&mut out, field, samples.plane, &frame);
     }
+    // the halo of a number interrupts the arrow behind it
+    out += &labels;
     axes::draw(&mut out, &frame, samples.plane);
     bar.draw(&mut out, &scale, style.quantity);
     Drawing { size: DVec2::new(width, height), body: out }
 }
 
-fn bands_and_lines(out: &mut String, field: &dyn Field, samples: &Samples, frame: &PlotFrame, scale: &Scale) {
+/// Draws the bands and their lines, and returns the numbers on these, which belong on top of all that is drawn in the
+/// plot.
+fn bands_and_lines(
+    out: &mut String,
+    field: &dyn Field,
+    samples: &Samples,
+    frame: &PlotFrame,
+    scale: &Scale,
+) -> String {
     let levels: Vec<Vec<Outline>> =
         scale.levels().iter().map(|&level| outlines(field, samples, level)).collect();
     let PlotFrame { origin, size, .. } = *frame;
@@ -125,16 +135,10 @@ fn bands_and_lines(out: &mut String, field: &dyn Field, samples: &Samples, frame
         draw(out, lines, r##"stroke="#222" stroke-opacity="0.42" stroke-width="0.5""##);
     }
     draw(out, &lines[zero], r##"stroke="#111" stroke-width="1.8""##);
-    labels(out, frame, scale, zero, &lines);
+    labels(frame, scale, zero, &lines)
 }
 
-fn labels(
-    out: &mut String,
-    frame: &PlotFrame,
-    scale: &Scale,
-    zero: usize,
-    lines: &[Vec<(Vec<DVec2>, bool)>],
-) {
+fn labels(frame: &PlotFrame, scale: &Scale, zero: usize, lines: &[Vec<(Vec<DVec2>, bool)>]) -> String {
     let lines: Vec<Vec<Vec<DVec2>>> =
         lines.iter().map(|level| level.iter().map(|(points, _)| points.clone()).collect()).collect();
     let mut placer = Placer::new(frame, &lines);
@@ -152,14 +156,14 @@ fn labels(
             hex(mean(scale.band_colour(k), scale.band_colour(k + 1)))
         );
     }
-    if !text.is_empty() {
-        let _ = write!(
-            out,
-            r#"<g font-size="10" font-weight="400" text-anchor="middle" paint-order="stroke" stroke-width="3.5" stroke-linejoin="round">
+    if text.is_empty() {
+        return text;
+    }
+    format!(
+        r#"<g font-size="10" font-weight="400" text-anchor="middle" paint-order="stroke" stroke-width="3.5" stroke-linejoin="round">
 {text}</g>
 "#
-        );
-    }
+    )
 }
 
 /// Draws grey hatching over every cell with a corner that has no value. Cells side by side make

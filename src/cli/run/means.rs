@@ -80,6 +80,11 @@ impl Means {
         Some((self.from, mean, self.error.get(column).copied().flatten()))
     }
 
+    /// What the scene knows of a column, counted from 0.
+    pub fn known(&self, column: usize) -> Option<f64> {
+        self.known.get(column).copied()
+    }
+
     /// These means, taken from a table that lacks the given number of samples.
     pub fn lacking(self, lost: usize) -> Self {
         Self { lost, ..self }

@@ -5,6 +5,7 @@ use std::fmt::Write as _;
 use super::super::output::significant;
 use super::super::plot::{self, Axis, EvenAxis, HEIGHT, LEFT, Legend, RIGHT, SECOND_AXIS, TOP, WIDTH};
 use super::means::{Means, rounded};
+use rfm::geom;
 use rfm::sph::Probe;
 
 const COLOURS: [&str; 6] = ["#1b6ca8", "#c05621", "#2f855a", "#6b46c1", "#b7791f", "#4a5568"];
@@ -57,13 +58,8 @@ fn is_rounding(probe: &Probe, own: &Series, all: &[Series]) -> bool {
 pub(super) fn drawn(name: &str, probe: &Probe, table: &str, means: Option<&Means>) -> String {
     let (times, series) = columns(probe, table);
     let mut out = plot::begin(name);
-    if series.iter().all(Series::is_empty) {
-        plot::sentence(&mut out, "no values: there was never any fluid where this probe measures");
-        return out;
-    }
-    if series.iter().all(|s| s.is_zero() || s.is_empty()) {
-        let what: Vec<&str> = series.iter().map(|s| s.name.as_str()).collect();
-        plot::sentence(&mut out, &format!("zero at all times: {}", what.join(", ")));
+    if let Some(why) = nothing_to_draw(&series) {
+        plot::sentence(&mut out, &why);
         return out;
     }
     let shown = |s: &&Series| !s.is_zero() && !s.is_empty() && !is_rounding(probe, s, &series);
@@ -75,13 +71,15 @@ pub(super) fn drawn(name: &str, probe: &Probe, table: &str, means: Option<&Means
     }
     let right = WIDTH - RIGHT - if units.len() > 1 { SECOND_AXIS } else { 0.0 };
     let x = EvenAxis::over(times.iter().copied(), LEFT, right);
-    let mut axes: Vec<EvenAxis> = units
-        .iter()
-        .map(|unit| {
-            let own = series.iter().filter(shown).filter(|s| s.unit == *unit);
-            EvenAxis::over(own.flat_map(|s| s.values.iter().copied()), HEIGHT - plot::BOTTOM, TOP)
-        })
-        .collect();
+    // energies are shown from their start on
+    let means = means.filter(|_| *probe != Probe::Energy);
+    let known = |k: usize| means.and_then(|means| means.known(k));
+    let axis = |unit: &&str| {
+        let own = series.iter().enumerate().filter(|(_, s)| shown(s) && s.unit == *unit);
+        let values = own.flat_map(|(k, s)| s.values.iter().copied().chain(known(k)));
+        EvenAxis::over(values, HEIGHT - plot::BOTTOM, TOP)
+    };
+    let mut axes: Vec<EvenAxis> = units.iter().map(axis).collect();
     EvenAxis::with_common_zero(&mut axes);
     plot::grid(&mut out, &x, &axes[0], ["time, s", &axis_name(&series, units[0])], right);
     if let Some(second) = axes.get(1) {
@@ -90,10 +88,12 @@ pub(super) fn drawn(name: &str, probe: &Probe, table: &str, means: Option<&Means
     let mut legend = Legend::new();
     for (k, s) in series.iter().enumerate().filter(|(_, s)| shown(s)) {
         let axis = usize::from(s.unit != units[0]);
-        // energies are shown from their start on
-        let mean = means.filter(|_| *probe != Probe::Energy).and_then(|means| means.of_column(k));
+        let mean = means.and_then(|means| means.of_column(k));
         if let Some(mean) = mean {
             draw_mean(&mut out, mean, (&x, right), &axes[axis], s.colour);
+        }
+        if let Some(known) = known(k) {
+            draw_known(&mut out, known, &axes[axis], right, s.colour);
         }
         let path = path(&times, &s.values, &x, &axes[axis]);
         // writing to a String cannot fail
@@ -108,14 +108,7 @@ pub(super) fn drawn(name: &str, probe: &Probe, table: &str, means: Option<&Means
         for (t, v) in lone(&times, &s.values) {
             plot::dot(&mut out, x.at(t), axes[axis].at(v), s.colour);
         }
-        if let Some((from, mean, error)) = mean {
-            let figures = match error.map(|error| rounded(mean, error)) {
-                Some((mean, error)) => format!("mean {mean} ± {error}"),
-                None => format!("mean {}", significant(mean, 3)),
-            };
-            legend.remark(&mut out, &figures);
-            legend.remark(&mut out, &format!("from {from} s on"));
-        }
+        figures(&mut out, &mut legend, mean, known(k));
     }
     legend.gap();
     if axes.len() > 1 {
@@ -130,6 +123,31 @@ pub(super) fn drawn(name: &str, probe: &Probe, table: &str, means: Option<&Means
         legend.remark(&mut out, &format!("{}: {what}", s.name));
     }
     out
+}
+
+/// Why a plot would have no line; `None` if it has one.
+fn nothing_to_draw(series: &[Series]) -> Option<String> {
+    if series.iter().all(Series::is_empty) {
+        return Some("no values: there was never any fluid where this probe measures".into());
+    }
+    let what: Vec<&str> = series.iter().map(|s| s.name.as_str()).collect();
+    let is_flat = series.iter().all(|s| s.is_zero() || s.is_empty());
+    is_flat.then(|| format!("zero at all times: {}", what.join(", ")))
+}
+
+/// Adds to the legend the mean of a column from a time on, with its error, and what is known of it.
+fn figures(out: &mut String, legend: &mut Legend, mean: Option<(f64, f64, Option<f64>)>, known: Option<f64>) {
+    if let Some((from, mean, error)) = mean {
+        let figures = match error.map(|error| rounded(mean, error)) {
+            Some((mean, error)) => format!("mean {mean} ± {error}"),
+            None => format!("mean {}", significant(mean, 3)),
+        };
+        legend.remark(out, &figures);
+        legend.remark(out, &format!("from {from} s on"));
+    }
+    if let Some(known) = known {
+        legend.remark(out, &format!("known {}", geom::significant(known)));
+    }
 }
 
 /// The numbers of a table without its header.
@@ -198,6 +216,18 @@ fn draw_mean(
     );
 }
 
+/// Draws what the scene knows of a figure as a dashed line through the plot, which says so at its end.
+fn draw_known(out: &mut String, known: f64, y: &EvenAxis, right: f64, colour: &str) {
+    let at = y.at(known);
+    // writing to a String cannot fail
+    let _ = write!(
+        out,
+        r##"<line x1="{LEFT:.1}" y1="{at:.1}" x2="{right:.1}" y2="{at:.1}" stroke="{colour}" stroke-width="1.2" stroke-dasharray="9 4"/><text x="{:.1}" y="{:.1}" font-size="11" text-anchor="end" fill="{colour}" stroke="#ffffff" stroke-width="3" paint-order="stroke">known</text>"##,
+        right - 4.0,
+        at - 4.0
+    );
+}
+
 /// The values without neighbours, of which no line is seen.
 fn lone<'a>(times: &'a [f64], values: &'a [f64]) -> impl Iterator<Item = (f64, f64)> + 'a {
     let is_there = |k: usize| values.get(k).is_some_and(|v| v.is_finite());
@@ -244,6 +274,20 @@ mod tests {
         // beside a gap, too
         let gap = drawn("p", &probe, "time,pressure\n0,1\n1,2\n2,nan\n3,4\n4,nan\n", None);
         assert_eq!(gap.matches("<circle").count(), 1);
+    }
+
+    #[test]
+    fn what_is_known_is_a_line_with_room_for_it() {
+        let asked = rfm::lower::AskedMean { from: 0.0, known: vec![12.0], torque: false };
+        let probe = Probe::Pressure { at: glam::DVec3::ZERO };
+        let table = "time,pressure\n0,5\n1,7\n2,8\n3,6\n4,9\n";
+        let means = Means::of("p", &probe, &asked, &rows(table));
+        let svg = drawn("p", &probe, table, Some(&means));
+        assert!(svg.contains(">known</text>") && svg.contains(">known 12<") && svg.contains(">12<"), "{svg}");
+        let line = svg.split("stroke-dasharray=\"9 4\"").next().unwrap().rsplit("y1=\"").next().unwrap();
+        let y: f64 = line.split('"').next().unwrap().parse().unwrap();
+        assert!((TOP..HEIGHT - plot::BOTTOM).contains(&y), "{y}");
+        assert!(!drawn("p", &probe, table, None).contains("known"));
     }
 
     #[test]

@@ -80,6 +80,15 @@ function shown(x, digits = 3) {
   return String(Number(x.toPrecision(Math.max(digits, Math.ceil(Math.log10(size)))))).replace("-", "−");
 }
 
+/** A number for people with the digits that tell it apart from others which are this step away; `least` of them at least. */
+function shownBy(x, step, least = 2) {
+  if (x === 0 || !(step > 0)) return shown(x);
+  const power = (value) => Math.floor(Math.log10(value) + 1e-9);
+  // a step like 2.5 has two digits of its own
+  const own = (step / 10 ** power(step)).toPrecision(6) % 1 ? 2 : 1;
+  return shown(x, clamp(power(Math.abs(x)) - power(step) + own, least, 12));
+}
+
 /** The nearest of 1, 2, 5, 10, … at or below a number above 0. */
 function rounded(x) {
   const power = 10 ** Math.floor(Math.log10(x));

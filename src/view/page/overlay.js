@@ -63,13 +63,14 @@ function drawLegend(context, page, look, height) {
   context.textAlign = "left";
   const { name, unit } = look.legend;
   context.fillText(unit ? `${name}, ${unit}` : name, left, top - 14);
-  for (const tick of ticks(low, high, height > 120 ? 5 : 3)) {
+  const marks = ticks(low, high, height > 120 ? 5 : 3);
+  for (const tick of marks) {
     const y = top + height * (1 - (high > low ? (tick - low) / (high - low) : 0));
     context.beginPath();
     context.moveTo(left + width, y);
     context.lineTo(left + width + 4, y);
     context.stroke();
-    context.fillText(shown(tick, 4), left + width + 8, y);
+    context.fillText(shownBy(tick, marks.length > 1 ? marks[1] - marks[0] : 0, 4), left + width + 8, y);
   }
 }
 

@@ -12,6 +12,7 @@ class Plots {
     this.place = place;
     this.plots = [];
     this.sought = sought;
+    place.addEventListener("scroll", () => this.fade());
   }
 
   /** Takes plots: name, unit, times, and the values of each column. Those of the same names keep their place on the page. */
@@ -39,6 +40,13 @@ class Plots {
       if (!plot.still || plot.colours !== colours || plot.ratio !== ratio || plot.lines !== lines) this.prepare(plot, colours, ratio, lines);
       this.mark(plot, time);
     }
+    this.fade();
+  }
+
+  /** Lets the last plot fade where the column goes on below, so that it does not seem to be cut off. */
+  fade() {
+    const { scrollHeight, scrollTop, clientHeight } = this.place;
+    this.place.classList.toggle("goes-on", scrollHeight - scrollTop > clientHeight + 2);
   }
 
   /** The height of the lines with which all plots fit below each other, if there is one. */
@@ -46,7 +54,8 @@ class Plots {
     const context = this.measure ??= element("canvas").getContext("2d");
     context.font = PLOT_FONT;
     const rest = ({ columns }) => PLOT.title + PLOT.below + PLOT.numbers + PLOT.gap + PLOT.row * legendOf(context, columns).rows;
-    const room = innerHeight - this.place.getBoundingClientRect().top - 70;
+    // what the style lets the column have; a border is part of the gap
+    const room = Number.parseFloat(getComputedStyle(this.place).maxHeight);
     const height = (room - this.plots.reduce((sum, plot) => sum + rest(plot), 0)) / Math.max(this.plots.length, 1);
     return Math.floor(clamp(height, PLOT.low, PLOT.lines));
   }
@@ -72,7 +81,9 @@ class Plots {
     const [low, high] = rangeOf(plot.columns);
     // one number alone says nothing of the scale
     const marks = [3, 4, 5, 6].map((about) => ticks(low, high, about)).find((found) => found.length > 1) ?? [low];
-    const left = 10 + Math.max(...marks.map((mark) => context.measureText(shown(mark)).width), 18);
+    const step = marks.length > 1 ? marks[1] - marks[0] : 0;
+    const number = (value) => shownBy(value, step);
+    const left = 10 + Math.max(...marks.map((mark) => context.measureText(number(mark)).width), 18);
     const right = width - 10;
     const [first, last] = [plot.times[0] ?? 0, plot.times[plot.times.length - 1] ?? 0];
     const x = (t) => left + ((right - left) * (t - first)) / (last - first || 1);
@@ -83,15 +94,17 @@ class Plots {
     context.strokeStyle = colours.line;
     for (const mark of marks) {
       context.textAlign = "right";
-      context.fillText(shown(mark), left - 4, y(mark));
+      context.fillText(number(mark), left - 4, y(mark));
       line(context, [[left, y(mark)], [right, y(mark)]]);
     }
     context.textAlign = "left";
     context.fillText("t, s", 6, height - 8);
     context.textAlign = "center";
-    for (const mark of ticks(first, last, 4)) {
-      const half = context.measureText(shown(mark)).width / 2;
-      context.fillText(shown(mark), clamp(x(mark), left + half, right - half), height - 8);
+    const times = ticks(first, last, 4);
+    for (const mark of times) {
+      const text = shownBy(mark, times.length > 1 ? times[1] - times[0] : 0);
+      const half = context.measureText(text).width / 2;
+      context.fillText(text, clamp(x(mark), left + half, right - half), height - 8);
       line(context, [[x(mark), bottom], [x(mark), bottom + 3]]);
     }
     context.strokeRect(left, top, right - left, bottom - top);
@@ -107,12 +120,12 @@ class Plots {
       }
     });
     const at = (pixel) => clamp(first + ((pixel - left) / (right - left)) * (last - first), first, last);
-    Object.assign(plot, { still, colours, ratio, lines, legend, x, at, top, bottom, first, last });
+    Object.assign(plot, { still, colours, ratio, lines, legend, x, at, top, bottom, first, last, step, numbers: marks.map(number) });
   }
 
   /** Draws a plot with a line at a time, and the values at the nearest sample. */
   mark(plot, time) {
-    const { canvas, still, colours, ratio, legend, x, top, bottom, first, last } = plot;
+    const { canvas, still, colours, ratio, legend, x, top, bottom, first, last, step } = plot;
     const context = canvas.getContext("2d");
     context.setTransform(1, 0, 0, 1, 0, 0);
     context.clearRect(0, 0, canvas.width, canvas.height);
@@ -130,7 +143,7 @@ class Plots {
       context.fillText(column.name, left + 14, middle);
       context.fillStyle = colours.soft;
       context.textAlign = "right";
-      context.fillText(shown(column.values[k] ?? NaN), left + legend.width, middle);
+      context.fillText(shownBy(column.values[k] ?? NaN, step / 10, 3), left + legend.width, middle);
       context.textAlign = "left";
     });
     if (last > first && time >= first && time <= last) {

@@ -317,6 +317,7 @@ fn plots(room: &mut Room) {
     room.browser.key("d");
     assert_eq!(room.browser.number("document.querySelector('#plots').getBoundingClientRect().height"), 0.0);
     room.browser.key("d");
+    numbers(room);
 
     let viewer = Viewer::start(&room.folder, &["paddle.rfm", "-D", "particles=1500"]);
     room.browser.open(&viewer.address);
@@ -341,6 +342,20 @@ fn plots(room: &mut Room) {
     room.browser.wait_for("viewer.plots.plots[0].times.length > 20");
     room.shot("plots-dark");
     room.browser.theme("light");
+}
+
+/// A level that hardly changes: its numbers differ, and so do those of the times; what is typed is seen whole.
+fn numbers(room: &mut Room) {
+    let texts = room.browser.eval(
+        "(() => { const plot = { name: 'level', unit: 'm', times: [0, 1], columns: [{ name: 'height', values: [0.3, 0.3007] }] }; \
+         viewer.plots.set([plot]); viewer.plots.draw(0, viewer.look.colours, 1); return viewer.plots.plots[0].numbers.join(' '); })()",
+    );
+    assert_eq!(texts.as_str().unwrap(), "0.3 0.3005");
+    let clipped = room.browser.number(
+        "[...document.querySelectorAll('#low, #high')].filter((field) => { field.value = '-0.01862'; \
+         return field.scrollWidth > field.clientWidth; }).length",
+    );
+    assert_eq!(clipped, 0.0);
 }
 
 fn slice(room: &mut Room) {
