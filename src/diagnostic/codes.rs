@@ -220,8 +220,9 @@ SHAPES_AS_NUMBERS = "W0411":
 "`+`, `-`, `*` and `/` work on the values of ω, and the result is rarely a shape that someone means. Shapes are joined by
 `a or b`, cut by `a and b`, and taken away by `a \\ b`, and many of them are joined by `any`, not by `sum`. Comparisons are shapes
 too. Where the values are meant, give one of them a name with `let`.";
-DIVISION_BY_ZERO = "W0412":
-"A divisor is zero wherever it is evaluated, so the value is infinite or no number at all.";
+UNDEFINED_VALUE = "W0412":
+"A divisor is zero wherever it is evaluated, or a function of constants has no value, as `sqrt(-1)`, so the result is infinite or
+no number at all. A shape with a number that is none has no inside.";
 NO_SECTION = "W0413":
 "The plane of a slice does not meet the solid, or its section is thinner than a pixel: the picture shows the outside only.
 The message says between which coordinates the solid lies.";

@@ -158,9 +158,16 @@ impl Lowering<'_> {
                 {
                     self.warn_of_degrees(angle, &arguments[0].value);
                 }
-                number(operand.map(|a| self.unary(op, a[0], span)))
+                let value = operand.as_ref().map(|a| self.unary(op, a[0], span));
+                self.warn_of_undefined(builtin.name, operand.as_deref(), value, span);
+                number(value)
             }
-            Meaning::Number(build) => number(self.numbers(arguments).map(|a| build(self, &a, span))),
+            Meaning::Number(build) => {
+                let operands = self.numbers(arguments);
+                let value = operands.as_ref().map(|a| build(self, a, span));
+                self.warn_of_undefined(builtin.name, operands.as_deref(), value, span);
+                number(value)
+            }
             Meaning::NumberOfVectors(build) => number(self.vectors(arguments).map(|v| build(self, &v, span))),
             Meaning::Vector(build) => {
                 self.vectors(arguments).map_or(Value::Failed, |v| Value::Vector(build(self, &v, span)))

@@ -296,7 +296,9 @@ impl Lowering<'_> {
     fn power(&mut self, base: &Expr, exponent: &Expr, span: Span) -> Value {
         let (Some(a), Some(b)) = (self.field(base), self.field(exponent)) else { return Value::Failed };
         self.warn_of_power_of_shapes(base, exponent);
-        Value::Number(self.raise(a, b, span))
+        let value = self.raise(a, b, span);
+        self.warn_of_undefined("pow", Some(&[a, b]), Some(value), span);
+        Value::Number(value)
     }
 
     pub fn raise(&mut self, a: Node, b: Node, span: Span) -> Node {

@@ -8,6 +8,7 @@ use super::lowering::Lowering;
 use super::names::{Kind, TIME};
 use super::value::Value;
 use crate::diagnostic::{Code, Diagnostic, SourceId, Span};
+use crate::geom::significant;
 use crate::ir::{Binary, Node};
 use crate::quantity::{Dimension, parse_unit};
 use crate::syntax::ast::{Expr, ExprKind, Fold, Logic, MulOp};
@@ -127,8 +128,38 @@ impl Lowering<'_> {
         // elsewhere a value that is not finite is an error of its own
         if is_zero && (self.in_shape || self.in_let) && expr.span.source == SourceId::File {
             self.report(
-                Diagnostic::warning(Code::DIVISION_BY_ZERO, expr.span, "the divisor is zero")
+                Diagnostic::warning(Code::UNDEFINED_VALUE, expr.span, "the divisor is zero")
                     .help("is another divisor meant? what depends on this value is infinite or no number"),
+            );
+        }
+    }
+
+    /// Warns of a function of constants that has no finite value, as `sqrt(-1)`, and of no others: what a value of it
+    /// makes undefined is not its mistake.
+    pub fn warn_of_undefined(
+        &mut self,
+        function: &str,
+        operands: Option<&[Node]>,
+        value: Option<Node>,
+        span: Span,
+    ) {
+        let (Some(operands), Some(node)) = (operands, value) else { return };
+        let is_looked_at = (self.in_shape || self.in_let) && span.source == SourceId::File;
+        let Some(value) = self.known_value(node).filter(|value| is_looked_at && !value.is_finite()) else {
+            return;
+        };
+        let Some(of) =
+            operands.iter().map(|operand| self.known_value(*operand)).collect::<Option<Vec<f64>>>()
+        else {
+            return;
+        };
+        if of.iter().all(|operand| operand.is_finite()) {
+            let of: Vec<String> = of.into_iter().map(|operand| significant(operand).to_string()).collect();
+            let is = if value.is_nan() { "no number" } else { "infinite" };
+            let message = format!("`{function}({})` is {is}", of.join(", "));
+            self.report(
+                Diagnostic::warning(Code::UNDEFINED_VALUE, span, message)
+                    .help("is another value meant? what depends on this one is infinite or no number"),
             );
         }
     }

@@ -67,7 +67,7 @@ use std::fmt;
 
 use glam::DVec3;
 
-use crate::geom::Placement;
+use crate::geom::{Placement, significant};
 
 pub use check::{Report, check, is_closed_manifold};
 pub use distance::MeshDistance;
@@ -201,7 +201,8 @@ impl fmt::Display for MeshError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::NotANumber { at } => {
-                write!(f, "the field is not a number at ({}, {}, {})", at.x + 0.0, at.y + 0.0, at.z + 0.0)
+                let [x, y, z] = at.to_array().map(significant);
+                write!(f, "the field is not a number at ({x}, {y}, {z})")
             }
             Self::Ended => write!(f, "the mesh was not finished: it was ended before"),
             Self::TooManyVertices { found } => {

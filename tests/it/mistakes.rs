@@ -215,6 +215,8 @@ const SHAPES: &[&str] = &[
 
 /// Signs that mean something elsewhere.
 const SIGNS: &[&str] = &[
+    "solid s = sphere(1, centre: [0, 0, 1])",
+    "solid s = box(min: [0, 0, 0], max: [1, 2, 3]) and z <= 1",
     "solid s = sphere(1) ∪ box()",
     "solid s = sphere(1) ∩ box()",
     "solid s = sphere(√(2))",

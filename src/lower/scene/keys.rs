@@ -78,6 +78,38 @@ fn blocks_with(key: &str, declared: &[SceneKey]) -> Vec<&'static str> {
     declared.iter().filter(has_key).map(|block| block.name).collect()
 }
 
+/// Where a key belongs: to the first of some blocks, all of which are listed, and perhaps to other methods alone.
+fn key_of_blocks(key: &str, (block, all): (&str, &str), methods: &[&str]) -> String {
+    // a probe must have a name
+    let label = if block == "probe" { " gauge" } else { "" };
+    let form = format!("`{block}{label} {{ {key}: … }}`");
+    match methods {
+        [] => format!("it is a key of {all}: write {form}"),
+        [method, ..] => {
+            let has = if methods.len() == 1 { "has" } else { "have" };
+            format!(
+                "{} {has} it as a key of {all}: leave it out, or write `method: {method}` and {form}",
+                methods.join(" and ")
+            )
+        }
+    }
+}
+
+/// The methods of a key, if it belongs to some methods alone and not to that of these entries of a scene.
+fn of_other_methods(key: &str, entries: &[Entry], declared: &[SceneKey]) -> Vec<&'static str> {
+    let has_key = |block: &SceneKey| block.block().is_some_and(|keys| names(keys).any(|name| name == key));
+    let methods = [KeyBlock::Fluid, KeyBlock::Solver].map(|block| Method::with_key(block, key)).concat();
+    let stated = entries.iter().find_map(|entry| match entry {
+        Entry::Setting { key, value } if key.text == "method" => match &value.kind {
+            ExprKind::Name(word) => Some(word.as_str()),
+            _ => None,
+        },
+        Entry::Setting { .. } | Entry::Block { .. } => None,
+    });
+    let own = stated.unwrap_or(Method::default().name());
+    if methods.contains(&own) || declared.iter().any(has_key) { Vec::new() } else { methods }
+}
+
 /// Names in a sentence: `a`, `b` and `c`.
 fn listed(names: &[&str]) -> String {
     let quoted: Vec<String> = names.iter().map(|name| format!("`{name}`")).collect();
@@ -152,11 +184,10 @@ impl<'a> Lowering<'a> {
                     (Some(own), _) => diagnostic
                         .help(format!("`{}` is called `{own}` here", key.text))
                         .edit(key.span, &key.text, own, false),
-                    (None, [block, ..]) => diagnostic.help(format!(
-                        "it is a key of {}: write `{block}{} {{ {inner_key}: … }}`",
-                        listed(&inner),
-                        // a probe must have a name
-                        if *block == "probe" { " gauge" } else { "" }
+                    (None, [block, ..]) => diagnostic.help(key_of_blocks(
+                        inner_key,
+                        (block, &listed(&inner)),
+                        &of_other_methods(inner_key, entries, declared),
                     )),
                     (None, []) if is_outer => diagnostic.help(format!(
                         "it is a key of the scene: write `{}: …` outside of this block",

@@ -1,7 +1,7 @@
 //! Slips in the heads of items, folds and blocks.
 
 use super::super::foreign;
-use super::{Slip, bracketed, fits, last_word};
+use super::{Slip, bracketed, fits, last_word, parts, unclosed};
 use crate::diagnostic::{Code, Diagnostic, Span};
 
 /// What begins a fold.
@@ -21,7 +21,10 @@ impl Slip<'_> {
                 .or_else(|| self.function_by_let())
                 .or_else(|| self.obstacle_by_a_shape()),
             "[" => self.range_in_brackets(),
-            ":" => self.type_of_a_param().or_else(|| self.value_behind_a_colon()),
+            ":" => self
+                .type_of_a_param()
+                .or_else(|| self.value_behind_a_colon())
+                .or_else(|| self.argument_behind_a_colon()),
             "-" => self.name_with_a_dash(),
             "." => self.box_as_a_range().or_else(|| self.fold_of_three()),
             "}" => self.block_without_a_key(),
@@ -122,6 +125,30 @@ impl Slip<'_> {
             let body = if fits(&[body]) { body } else { "…" };
             self.unexpected().help(format!("a fold has no brackets: write `{fold} {head}: {body}`"))
         })
+    }
+
+    /// `sphere(1, centre: [0, 0, 1])`
+    fn argument_behind_a_colon(&self) -> Option<Diagnostic> {
+        let before = self.before();
+        let open = unclosed(before)?;
+        let function = last_word(&before[..open]);
+        let name = last_word(before);
+        let is_named = before[..before.len() - name.len()].trim_end().ends_with(['(', ',']);
+        if function.is_empty() || FOLDS.contains(&function) || name.is_empty() || !is_named {
+            return None;
+        }
+        let inner = bracketed(&self.text[self.start.min(self.at) + open..]);
+        let written = |part: &str| match part.split_once(':') {
+            Some((word, value)) if last_word(word.trim()) == word.trim() => {
+                format!("{} = {}", word.trim(), value.trim())
+            }
+            _ => part.to_string(),
+        };
+        let arguments: Option<Vec<String>> =
+            inner.map(|inner| parts(inner).into_iter().map(written).collect());
+        let call = arguments.map(|arguments| format!("{function}({})", arguments.join(", ")));
+        let call = call.filter(|call| fits(&[call])).unwrap_or_else(|| format!("{name} = …"));
+        Some(self.unexpected().help(format!("a named argument has `=`: write `{call}`")))
     }
 
     /// `let f(x) = x^2`
