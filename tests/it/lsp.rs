@@ -271,6 +271,17 @@ scene drop {
     assert!(editor.hover(3, 38).contains("move(by)"));
     assert!(editor.hover(8, 31).contains("key `fill`"));
     assert_eq!(editor.at("hover", 0, 1), Value::Null);
+    assert_eq!(editor.hover(2, 13), "1 mm = 0.001 m");
+    assert_eq!(editor.hover(3, 9), "`at`: a parameter of the function `post`");
+    assert_eq!(editor.hover(3, 12), "`h`: a parameter of the function `post`, 1 if it is left out");
+    assert_eq!(editor.hover(8, 9), "`water`: the fluid of the scene `drop`");
+    assert!(editor.hover(9, 9).contains("`probes/sum.csv`"));
+    editor.change("rfm 1\nsolid s = any i in 0..3: sphere(1).move([3*i, 0, 0])\n");
+    let words = editor.hover(1, 11);
+    assert!(words.starts_with("a fold by `or`"), "{words}");
+    assert_eq!(editor.hover(1, 14), "`i`: the variable of a fold by `any`");
+    assert!(editor.at("rename", 1, 11)["code"].is_number());
+    editor.change(text);
 
     let found = editor.at("definition", 5, 62);
     assert_eq!(found["range"]["start"], json!({ "line": 2, "character": 6 }));

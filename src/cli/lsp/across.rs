@@ -67,7 +67,12 @@ impl Place {
 pub(super) fn own_name(document: &Document, byte: usize) -> Option<&Mention> {
     document.reading.names.at(byte).filter(|mention| match mention.meaning {
         Meaning::Defined(_) | Meaning::Imported(_) => true,
-        Meaning::File(_) | Meaning::Standard | Meaning::Key(_) | Meaning::Word(_) => false,
+        Meaning::File(_)
+        | Meaning::Standard
+        | Meaning::Key(_)
+        | Meaning::Word(_)
+        | Meaning::Unit
+        | Meaning::Fold => false,
     })
 }
 
@@ -106,7 +111,7 @@ impl Workspace {
                 let bytes = offered(&file.reading, &mention.text, parameter_of.as_deref())?;
                 Some(Place { uri, file: File::Open(file), bytes })
             }
-            Meaning::Standard | Meaning::Key(_) | Meaning::Word(_) => None,
+            Meaning::Standard | Meaning::Key(_) | Meaning::Word(_) | Meaning::Unit | Meaning::Fold => None,
         }
     }
 
@@ -259,9 +264,13 @@ fn imported_uses(reading: &Reading, path: &str, name: &str, parameter_of: Option
         Meaning::Imported(of) => {
             mention.text == name && of.parameter_of.as_deref() == parameter_of && is_of_file(&of.path)
         }
-        Meaning::Defined(_) | Meaning::File(_) | Meaning::Standard | Meaning::Key(_) | Meaning::Word(_) => {
-            false
-        }
+        Meaning::Defined(_)
+        | Meaning::File(_)
+        | Meaning::Standard
+        | Meaning::Key(_)
+        | Meaning::Word(_)
+        | Meaning::Unit
+        | Meaning::Fold => false,
     });
     uses.map(|mention| mention.place.clone()).collect()
 }
@@ -269,7 +278,12 @@ fn imported_uses(reading: &Reading, path: &str, name: &str, parameter_of: Option
 fn is_name(mention: &Mention) -> bool {
     match mention.meaning {
         Meaning::Defined(_) | Meaning::Standard => true,
-        Meaning::Imported(_) | Meaning::File(_) | Meaning::Key(_) | Meaning::Word(_) => false,
+        Meaning::Imported(_)
+        | Meaning::File(_)
+        | Meaning::Key(_)
+        | Meaning::Word(_)
+        | Meaning::Unit
+        | Meaning::Fold => false,
     }
 }
 

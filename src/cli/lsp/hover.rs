@@ -2,16 +2,20 @@
 
 use std::ops::Range;
 
-use rfm::geom::Aabb;
+use rfm::geom::{Aabb, significant};
 use rfm::glam::DVec3;
-use rfm::syntax::ast::{Definition, Item};
+use rfm::quantity::parse_unit;
+use rfm::syntax::ast::{Definition, Entry, Expr, ExprKind, Item, Name};
 use rfm::{Engine, Program};
 
 use super::across::{Workspace, offered};
 use super::complete::{method_around, signature};
 use super::document::Document;
 use super::names::{Imported, Meaning, Mention};
-use crate::cli::language::{keys, words::comment_above};
+use crate::cli::language::{
+    keys,
+    words::{SIGNS, comment_above},
+};
 
 /// Lines of a definition that are shown.
 const MOST_LINES: usize = 12;
@@ -33,8 +37,63 @@ pub(super) fn at(workspace: &Workspace, document: &Document, byte: usize) -> Opt
             let about = keys::about(block.as_deref(), &mention.text, Some(method));
             format!("key `{}`{}", mention.text, if about.is_empty() { about } else { format!(": {about}") })
         }
+        Meaning::Unit => unit(&mention.text)?,
+        Meaning::Fold => SIGNS.iter().find(|(word, _)| *word == mention.text)?.1.to_string(),
     };
     Some((words, mention.place.clone()))
+}
+
+/// How large a unit is in SI units.
+fn unit(text: &str) -> Option<String> {
+    let parsed = parse_unit(text)?;
+    let factor = significant(parsed.factor);
+    Some(match parsed.dimension.unit() {
+        Some(own) if own == text => format!("the unit {own}"),
+        Some(own) => format!("1 {text} = {factor} {own}"),
+        None => format!("1 {text} = {factor} in SI units"),
+    })
+}
+
+/// What defines a name that is no item, and where.
+fn inner(document: &Document, place: &Range<usize>) -> Option<String> {
+    let is_it = |name: &Name| name.span.range() == *place;
+    document.reading.ast.items.iter().find_map(|item| match item {
+        Item::Function(function) if function.parameters.iter().any(|parameter| is_it(&parameter.name)) => {
+            let parameter = function.parameters.iter().find(|parameter| is_it(&parameter.name))?;
+            let default = parameter.default.as_ref();
+            let default = default.and_then(|value| document.text().get(value.span.range()));
+            let default = default.map_or(String::new(), |text| format!(", {text} if it is left out"));
+            Some(format!("a parameter of the function `{}`{default}", function.name.text))
+        }
+        Item::Function(function) => variable(&function.body, &is_it),
+        Item::Let(definition) | Item::Solid(definition) => variable(&definition.value, &is_it),
+        Item::Scene(scene) => labelled(&scene.entries, &is_it, &scene.name.text),
+        Item::Param(_) | Item::Import(_) => None,
+    })
+}
+
+/// The block of a scene that a name is the label of, or the fold in it whose variable it is.
+fn labelled(entries: &[Entry], is_it: &dyn Fn(&Name) -> bool, scene: &str) -> Option<String> {
+    entries.iter().find_map(|entry| match entry {
+        Entry::Block { key, label: Some(label), .. } if is_it(label) => Some(match key.text.as_str() {
+            "probe" => {
+                format!("a probe of the scene `{scene}`: a run writes it to `probes/{}.csv`", label.text)
+            }
+            key => format!("the {key} of the scene `{scene}`"),
+        }),
+        Entry::Block { entries, .. } => labelled(entries, is_it, scene),
+        Entry::Setting { value, .. } => variable(value, is_it),
+    })
+}
+
+/// The fold within an expression whose variable a name is.
+fn variable(expr: &Expr, is_it: &dyn Fn(&Name) -> bool) -> Option<String> {
+    if let ExprKind::Fold { op, variable, .. } = &expr.kind
+        && is_it(variable)
+    {
+        return Some(format!("the variable of a fold by `{}`", op.word()));
+    }
+    expr.children().into_iter().find_map(|child| self::variable(child, is_it))
 }
 
 /// What is known of a name in the file that defines it.
@@ -60,7 +119,9 @@ fn defined(document: &Document, mention: &Mention, place: &Range<usize>) -> Stri
     let text = document.text();
     let item = document.reading.ast.items.iter().find(|item| item.name().span.range() == *place);
     let Some(item) = item else {
-        return format!("`{}`: a parameter, the variable of a fold, or the label of a block", mention.text);
+        let what = inner(document, place);
+        return what
+            .map_or_else(|| format!("`{}`", mention.text), |what| format!("`{}`: {what}", mention.text));
     };
     let (keyword, end) = match item {
         Item::Param(param) => {

@@ -26,6 +26,10 @@ pub(super) enum Meaning {
     Word(String),
     /// A key of a scene, in the block with this name; `None` for the scene itself.
     Key(Option<String>),
+    /// The unit of a quantity.
+    Unit,
+    /// The word that a fold begins with.
+    Fold,
 }
 
 /// Something that an imported file defines.
@@ -249,7 +253,10 @@ impl<'a> Reader<'a> {
                 }
                 self.arguments(arguments, own);
             }
-            ExprKind::Fold { variable, members, body, .. } => {
+            ExprKind::Quantity { unit, .. } => self.mention(unit, Meaning::Unit),
+            ExprKind::Fold { op, variable, members, body } => {
+                let (place, text) = (self.place(expr.span, op.word()), op.word().to_string());
+                self.found.push(Mention { place, text, meaning: Meaning::Fold });
                 self.exprs(members.exprs());
                 self.define(variable);
                 self.locals.push(variable);

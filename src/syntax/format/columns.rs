@@ -191,12 +191,17 @@ fn under(tokens: &[Token], lines: &[Line], i: usize, above: usize, value: usize)
 enum Class<'t> {
     Comment,
     Text,
-    Operand,
+    /// What stands behind this sign; the name behind the word that an item or an entry begins with has none.
+    Operand(&'t str),
     Mark(&'t str),
 }
 
-/// The class of a token. `None` if it follows the one before it without a blank, or came from another line.
-fn class(token: &Token) -> Option<Class<'_>> {
+/// Signs whose operands share columns among themselves: the end of a range and the operand of an `and` stand below each
+/// other by chance.
+const SIGNS: [&str; 5] = ["=", "..", "in", ",", ":"];
+
+/// The class of a token behind another. `None` if it follows that without a blank, or came from another line.
+fn class<'t>(before: &Token, token: &'t Token) -> Option<Class<'t>> {
     if token.moved {
         return None;
     }
@@ -205,7 +210,9 @@ fn class(token: &Token) -> Option<Class<'_>> {
         Kind::Text => Some(Class::Text),
         Kind::Word if token.text == "in" => Some(Class::Mark("in")),
         Kind::Word | Kind::Number | Kind::Quantity | Kind::Sign | Kind::Open | Kind::Version => {
-            Some(Class::Operand)
+            let sign = SIGNS.into_iter().find(|sign| *sign == before.text);
+            let other = if before.begins == Begins::Nothing { "other" } else { "" };
+            Some(Class::Operand(sign.unwrap_or(other)))
         }
         Kind::Operator | Kind::Product | Kind::Not | Kind::NotSign | Kind::OpenBrace | Kind::CloseBrace => {
             Some(Class::Mark(&token.text))
@@ -223,8 +230,17 @@ fn class(token: &Token) -> Option<Class<'_>> {
 
 /// The tokens that share a column with each token, as the number of their group.
 fn groups(tokens: &[Token], lines: &[Line]) -> Vec<Option<usize>> {
-    let mut members: HashMap<(usize, usize, Class<'_>), Vec<usize>> = HashMap::new();
+    let mut members: HashMap<(usize, usize, usize, Class<'_>), Vec<usize>> = HashMap::new();
+    let mut depth = 0;
     for line in lines {
+        let inside = depth;
+        for token in &tokens[line.first..line.end] {
+            match token.kind {
+                Kind::OpenBrace => depth += 1,
+                Kind::CloseBrace => depth = usize::saturating_sub(depth, 1),
+                _ => {}
+            }
+        }
         // what follows an operator at the beginning goes with it
         let leads =
             matches!(tokens[line.first].kind, Kind::Operator | Kind::Product | Kind::Not | Kind::NotSign);
@@ -232,8 +248,10 @@ fn groups(tokens: &[Token], lines: &[Line]) -> Vec<Option<usize>> {
             // what is written without a blank, as after a comma, stands in its column by chance
             let is_apart = tokens[i].column > tokens[i - 1].end_column;
             let blank = is_apart && between(&tokens[i - 1], &tokens[i]) > 0;
-            if let Some(class) = class(&tokens[i]).filter(|_| blank) {
-                members.entry((line.paragraph, tokens[i].column, class)).or_default().push(i);
+            if let Some(class) = class(&tokens[i - 1], &tokens[i]).filter(|_| blank) {
+                // lines of different depth are moved apart, and only comments stay in one column beside them
+                let within = if class == Class::Comment { 0 } else { inside };
+                members.entry((line.paragraph, tokens[i].column, within, class)).or_default().push(i);
             }
         }
     }

@@ -80,6 +80,16 @@ fn hand_made_columns_stay() {
     // what follows a comma or a sign without a blank stands below something else by chance
     check("param   a=1\nfn f(x1,y1=2)=x1\n", "param a = 1\nfn f(x1, y1 = 2) = x1\n");
     check("let    a=1\nsolid s=x\n", "let a = 1\nsolid s = x\n");
+    // lines of different depth are moved apart
+    check(
+        "param r=1\nlet   a=2\nscene q{box{max:[1,1,1]}\nfluid w{shape:x}}\n",
+        "param r = 1\nlet   a = 2\nscene q { box { max: [1, 1, 1] }\n  fluid w { shape: x } }\n",
+    );
+    // the end of a range and an operand of `and` are no column
+    check(
+        "param longer = 2 in 0 .. 3\nsolid s=sphere( 1 )  &&  z>=0\n",
+        "param longer = 2 in 0 .. 3\nsolid s = sphere(1) and z >= 0\n",
+    );
     // all move together
     check("let a  =1\nlet bc =2 + 3\nlet d  =x\n", "let a  = 1\nlet bc = 2 + 3\nlet d  = x\n");
 }
