@@ -28,6 +28,22 @@ pub fn significant(x: f64) -> f64 {
     format!("{x:.5e}").parse().unwrap_or(x) + 0.0
 }
 
+/// The direction of a vector; `None` if it is zero, infinite or no number. The length of a vector beyond 1e±154 cannot be
+/// computed from squares, so such vectors are scaled by a power of two, which changes no digit.
+pub fn direction(v: DVec3) -> Option<DVec3> {
+    /// Scales that bring the largest and the smallest numbers to where squares are numbers.
+    const DOWN: f64 = f64::from_bits((1023 - 600) << 52);
+    const UP: f64 = f64::from_bits((1023 + 600) << 52);
+    let largest = v.abs().max_element();
+    let scaled = match largest {
+        largest if largest > 1e140 => DOWN * v,
+        largest if largest < 1e-140 => UP * v,
+        _ => v,
+    };
+    let length = scaled.length();
+    (length > 0.0 && length.is_finite()).then(|| scaled / length)
+}
+
 /// Larger numbers are printed as they are: there thousandths are near the last digit.
 const LARGEST_WITH_THOUSANDTHS: f64 = 1e12;
 
@@ -172,7 +188,17 @@ mod tests {
     }
 
     #[test]
-    fn printed_numbers_have_six_digits() {
+    fn directions_of_vectors_of_any_size() {
+        let v = DVec3::new(1.0, -2.0, 0.3);
+        for scale in [1.0, 1e-200, 1e200, 1e-300, 5e307] {
+            let found = direction(scale * v).unwrap();
+            assert!((found - v.normalize()).length() < 1e-15, "{scale}: {found}");
+        }
+        assert_eq!(direction(v), Some(v / v.length()));
+        assert_eq!(direction(DVec3::new(0.0, 5e-324, 0.0)), Some(DVec3::Y));
+        for none in [DVec3::ZERO, DVec3::NAN, DVec3::new(f64::INFINITY, 1.0, 0.0)] {
+            assert_eq!(direction(none), None);
+        }
         assert_eq!([1.008_446_477_162_621_8, -0.0, 1e-30].map(significant), [1.008_45, 0.0, 1e-30]);
     }
 

@@ -16,6 +16,7 @@ use super::shared::Shared;
 use super::{choose, input, output};
 use crate::cli::output::Shown;
 use rfm::field::Points;
+use rfm::geom::direction;
 use rfm::ir::Unary;
 use rfm::solid::{CellMap, Chosen, Distance, Distances};
 use rfm::{Field, Precision, Solid};
@@ -384,9 +385,8 @@ impl Rows {
     /// The outward unit normal. Where ω has no gradient, as at centres, it points away from the nearest point of
     /// the surface, or towards it from inside; NaN where surfaces touch.
     fn normal(&self, p: DVec3, gradient: DVec3) -> DVec3 {
-        let length = gradient.length();
-        if length > 0.0 {
-            return -gradient / length;
+        if let Some(inward) = direction(gradient) {
+            return -inward;
         }
         let Distance { estimate, nearest, .. } = self.distances().at(p);
         (p - nearest) / estimate

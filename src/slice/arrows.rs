@@ -9,6 +9,7 @@ use glam::{DVec2, DVec3};
 use super::axes::{INK, PlotFrame};
 use super::plane::Plane;
 use crate::field::Field;
+use crate::geom::direction;
 
 /// The way from arrow to arrow, the length of one in the plane and of its head, in units of the page.
 const SPACING: f64 = 34.0;
@@ -54,7 +55,7 @@ pub fn draw(out: &mut String, field: &dyn Field, plane: Plane, frame: &PlotFrame
 /// The direction of −∇ω at a point; `None` where there is none.
 fn way_out(field: &dyn Field, p: DVec3) -> Option<DVec3> {
     let (omega, gradient) = field.omega_grad(p);
-    if omega.is_nan() { None } else { (-gradient).try_normalize() }
+    if omega.is_nan() { None } else { direction(-gradient) }
 }
 
 #[cfg(test)]

@@ -22,10 +22,10 @@ use crate::geom::Aabb;
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Distance {
     /// The distance of [`Distance::nearest`]: positive in the fluid, negative inside the solid, 0 on the
-    /// surface, ±∞ if there is no surface. Never nearer than the surface is.
+    /// surface, ±∞ if none was found. Never nearer than the surface is.
     pub estimate: f64,
     /// The radius of a ball around the point in which ω is proven not to have the other sign; never more
-    /// than the true distance.
+    /// than the true distance, and always finite: farther away than 2²⁵¹ nothing is looked for.
     pub clearance: f64,
     /// The nearest point of the surface that was found; NaN if there is none.
     pub nearest: DVec3,
@@ -149,10 +149,11 @@ impl Distances {
         };
         self.rays(&mut best);
         best.turn();
-        let reach = DVec3::splat(best.distance.min(2.0 * SEARCH_RADIUS));
-        let mut around = Aabb::new(p - reach, p + reach);
+        // nothing is proven beyond the box that is searched
+        let reach = best.distance.min(2.0 * SEARCH_RADIUS);
+        let mut around = Aabb::new(p - DVec3::splat(reach), p + DVec3::splat(reach));
         let Some(known) = target.shrink(&target.everything(), &mut around, Effort::Large) else {
-            return (best.distance, best.distance, best.point);
+            return (reach, best.distance, best.point);
         };
         if !best.distance.is_finite() {
             best.scatter(&around);
@@ -164,7 +165,7 @@ impl Distances {
         while let Some(Queued { rank, space, known }) = queue.pop() {
             let distance = -rank;
             if distance >= (1.0 - GAP) * best.distance || cells == MOST_CELLS || best.is_spent() {
-                return (distance.min(best.distance), best.distance, best.point);
+                return (distance.min(best.distance).min(reach), best.distance, best.point);
             }
             cells += 1;
             best.spend(target.work(&known));
@@ -181,7 +182,7 @@ impl Distances {
                 }
             }
         }
-        (best.distance, best.distance, best.point)
+        (best.distance.min(reach), best.distance, best.point)
     }
 
     /// Looks for the surface along the normal and the axes, first as far as the contact estimates.

@@ -33,6 +33,17 @@ fn quadrics_are_exact_along_the_normal() {
     check("box([0,0,0], [3,3,3])", [-2.0, 1.0, 1.0], 2.0, [-1.0, 0.0, 0.0], 0.0);
 }
 
+/// Squares of these gradients are no numbers, or zero: the surface is searched for.
+#[test]
+fn gradients_beyond_the_range_of_squares() {
+    for scale in ["1e200", "1e-200"] {
+        let ball = solid(&format!("{scale} - {scale}*x^2 - {scale}*y^2 - {scale}*z^2"));
+        let found = ball.contact(DVec3::new(1.2, 0.9, 0.0));
+        assert!((found.distance - 0.5).abs() < 1e-3, "{scale}: {found:?}");
+        assert!((found.normal - DVec3::new(0.8, 0.6, 0.0)).length() < 1e-3, "{scale}: {found:?}");
+    }
+}
+
 #[test]
 fn places_without_a_normal_are_finite() {
     let centre = solid("sphere(2)").contact(DVec3::ZERO);

@@ -85,6 +85,16 @@ fn contacts_are_never_lost_off_the_surface() {
     }
 }
 
+/// A ball larger than the space that is searched, and solids without a surface: nothing is proven beyond that space.
+#[test]
+fn clearances_are_finite() {
+    for text in ["sphere(1e78)", "x >= 1 and x <= 0", "x^2 >= -1"] {
+        let Distance { estimate, clearance, .. } = Distances::new(&solid(text)).at(DVec3::ONE);
+        assert!(estimate.is_infinite(), "{text}: {estimate}");
+        assert!(clearance.is_finite() && clearance < 1e78, "{text}: {clearance}");
+    }
+}
+
 /// Solids whose distance is known in closed form, at random points and at points of their axes.
 #[test]
 fn clearances_are_never_too_long() {

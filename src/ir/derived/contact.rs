@@ -12,6 +12,9 @@
 //! two factors are split into their faces, sign(pq) = (p∧q)∨(¬p∧¬q): the product of a slab is half the
 //! distance far away.
 //!
+//! Where |∇u|² leaves the range of numbers (|∇u| beyond 1e±154), the distance comes out as 0 or NaN, and whoever asks looks
+//! for the surface by ranges instead: scaling each gradient first would cost every contact.
+//!
 //! The surface of a leaf that depends on time moves along its outward normal n with the speed u_t/|∇u|: on
 //! u(x(t), t) = 0 the derivative ∇u·x′ + u_t vanishes, and n = −∇u/|∇u|.
 
