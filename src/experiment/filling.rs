@@ -409,7 +409,10 @@ impl Experiment {
                 100.0 * part
             );
             Diagnostic::warning(Code::FLUID_LIGHTER, self.scene.fluid.shape_span, message)
-                .help("more particles leave less; `method: wcsph` keeps all of the mass")
+                .help(
+                    "more particles leave less; `method: wcsph` keeps all of the mass, and bodies that move in it meet \
+                     all of its resistance",
+                )
         })
     }
 

@@ -39,6 +39,31 @@ fn a_deep_column_stands_from_the_first_step() {
     assert!(speed < 0.3 && (0.98..1.0).contains(&top), "{speed} m/s, {top} m");
 }
 
+/// Water between walls that no whole number of layers fits, where the system of forces sees no compression in layers that
+/// leave the walls. (Without the arrest its energy grew by 39 % in 0.3 s with 2.4 spacings, and doubled with 2.3.)
+#[test]
+fn water_in_a_narrow_channel_keeps_its_energy() {
+    for width in [2.3, 2.4, 4.3] {
+        let mut simulation = simulation(&format!(
+            "rfm 1
+let spacing = 0.024
+scene channel {{
+  box {{ min: [0, 0, 0], max: [0.5, {width}*spacing, 0.6], restitution: 0 }}
+  fluid water {{ shape: box([0, 0, 0], [0.5, {width}*spacing, 0.3]), density: 1000, spacing: spacing }}
+  method: dfsph
+  run {{ until: 0.3 s, save_every: 0.1 s }}
+}}"
+        ));
+        while simulation.time() < 0.3 {
+            simulation.step().unwrap_or_else(|e| panic!("{width}: {e}"));
+        }
+        let excess = simulation.audit().energy_excess().unwrap_or(0.0);
+        println!("{width} spacings: energy {:.2} % above that at the start", 100.0 * excess);
+        // the lattice gives way by a hundredth, and the level rises with it
+        assert!(excess < 0.015, "{width}: {excess}");
+    }
+}
+
 /// Water under its own weight starts with the same densities however its gravity is written, and in a vessel that turns
 /// with those of p = ρ(½ω²r² − gz) below its highest place.
 #[test]
