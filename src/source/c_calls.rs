@@ -4,13 +4,8 @@
 //! block, see `c_folds`. Sines and cosines are vectorised as well, see `c_waves`; a second loop calls the library for the
 //! few arguments that these leave to it.
 
-use super::c_links::{Chunk, cheap, companions};
+use super::c_links::{Chunk, cheap, companions, is_call};
 use crate::ir::{Binary, Expr, Graph, Node, Unary, UnaryFunction};
-
-/// Whether a node calls a function of the mathematical library.
-pub(super) fn is_call(graph: &Graph, node: Node) -> bool {
-    matches!(graph.expr(node), Expr::Unary(Unary::Call(_), _) | Expr::Binary(Binary::Call(_), ..))
-}
 
 /// Whether a node is a sine or a cosine.
 fn is_wave(graph: &Graph, node: Node) -> bool {

@@ -9,9 +9,13 @@ use std::hash::{Hash, Hasher};
 
 use rustc_hash::FxHasher;
 
-use super::c_calls::is_call;
 use super::c_chunks::carried;
 use crate::ir::{Binary, Expr, Graph, Node, R0, Unary, UnaryFunction};
+
+/// Whether a node calls a function of the mathematical library.
+pub(super) fn is_call(graph: &Graph, node: Node) -> bool {
+    matches!(graph.expr(node), Expr::Unary(Unary::Call(_), _) | Expr::Binary(Binary::Call(_), ..))
+}
 
 /// A cut is sought within this number of operations. Where parts have few shapes, long chunks need fewer columns; where
 /// they have many, as the links of a sweep do whose directions differ in their signs, short chunks are more often equal.
