@@ -5,7 +5,7 @@
 //! few arguments that these leave to it.
 
 use super::c_links::{Chunk, cheap, companions, is_call};
-use crate::ir::{Binary, Expr, Graph, Node, Unary, UnaryFunction};
+use crate::ir::{Expr, Graph, Node, Unary, UnaryFunction};
 
 /// Whether a node is a sine or a cosine.
 fn is_wave(graph: &Graph, node: Node) -> bool {
