@@ -111,6 +111,7 @@ impl<'a> Stages<'a> {
 mod tests {
     use super::*;
     use crate::ir::Axis;
+    use crate::ir::Binary;
 
     #[test]
     fn arithmetic_and_calls_take_turns() {
