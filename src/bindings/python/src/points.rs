@@ -96,7 +96,7 @@ pub fn refuse_masked(given: &Bound<'_, PyAny>) -> PyResult<()> {
     refuse_masked_within(given, DEEPEST)
 }
 
-/// Likewise, in lists that hold one another so many times.
+/// The same for what lists hold that lie in one another, `depth` deep at most.
 fn refuse_masked_within(given: &Bound<'_, PyAny>, depth: usize) -> PyResult<()> {
     let py = given.py();
     if given.is_instance_of::<PyList>() || given.is_instance_of::<PyTuple>() {
