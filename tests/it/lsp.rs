@@ -1,5 +1,6 @@
 //! `rfm lsp` over real pipes, by a small client. What an editor shows is tested, not how the messages are written.
 
+use std::collections::HashMap;
 use std::io::{BufRead, BufReader, Read, Write};
 use std::process::{Child, ChildStdin, ChildStdout, Command, Stdio};
 use std::time::Instant;
@@ -18,6 +19,8 @@ pub struct Editor {
     last: i64,
     /// Messages about the file, as they came last.
     pub messages: Vec<Value>,
+    /// Messages about each file by its address, as they came last.
+    pub of_files: HashMap<String, Vec<Value>>,
 }
 
 impl Editor {
@@ -34,7 +37,7 @@ impl Editor {
             .spawn()
             .unwrap();
         let (to, from) = (server.stdin.take(), BufReader::new(server.stdout.take().unwrap()));
-        let mut editor = Self { server, to, from, last: 0, messages: Vec::new() };
+        let mut editor = Self { server, to, from, last: 0, messages: Vec::new(), of_files: HashMap::new() };
         let capabilities = json!({ "general": { "positionEncodings": encodings }, "textDocument": text });
         let answer = editor
             .ask("initialize", json!({ "capabilities": capabilities, "processId": null, "rootUri": null }));
@@ -93,7 +96,7 @@ impl Editor {
         loop {
             let message = self.read();
             if message["method"] == "textDocument/publishDiagnostics" {
-                self.messages = message["params"]["diagnostics"].as_array().unwrap().clone();
+                self.keep(&message["params"]);
             } else if message["id"] == self.last {
                 let error = &message["error"];
                 assert_ne!(error["code"], -32603, "{method}: {error}");
@@ -106,10 +109,15 @@ impl Editor {
         loop {
             let message = self.read();
             if message["method"] == "textDocument/publishDiagnostics" {
-                self.messages = message["params"]["diagnostics"].as_array().unwrap().clone();
+                self.keep(&message["params"]);
                 return &self.messages;
             }
         }
+    }
+
+    fn keep(&mut self, published: &Value) {
+        self.messages = published["diagnostics"].as_array().unwrap().clone();
+        self.of_files.insert(published["uri"].as_str().unwrap().to_string(), self.messages.clone());
     }
 
     pub fn open(&mut self, text: &str) -> &[Value] {
