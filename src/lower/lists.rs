@@ -8,10 +8,6 @@ use crate::diagnostic::{Code, Diagnostic, Span};
 use crate::ir::{Binary, Node};
 use crate::syntax::ast::{Expr, ExprKind, Fold, Logic, Members, Name};
 
-/// The most members of a fold. The budget of nodes is checked after each member, so this only bounds folds
-/// whose members add no node.
-const LONGEST_FOLD: f64 = 1e7;
-
 /// The most numbers of a list with all lists in it.
 const MOST_NUMBERS: usize = 100_000;
 
@@ -145,9 +141,8 @@ impl Lowering<'_> {
             self.report(Diagnostic::error(Code::OUT_OF_RANGE, whole, message).help(self.more_members(op)));
             return None;
         }
-        if end - start > LONGEST_FOLD {
-            let message = format!("a range with {} members", end - start);
-            self.report(Diagnostic::error(Code::TOO_LARGE, whole, message));
+        // each member is a constant of the graph, whatever is made of it
+        if !self.may_unroll(end - start, "make the range shorter", whole) {
             return None;
         }
         if end - start == 1.0 && is_written && matches!(op, Fold::Any | Fold::All) {

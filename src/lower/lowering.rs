@@ -196,21 +196,35 @@ impl Lowering<'_> {
         let too_many = self.module.graph.len() > self.max_nodes;
         let most_evaluations = self.max_nodes.saturating_mul(EVALUATIONS_PER_NODE);
         let over = too_many || self.evaluations > most_evaluations;
-        if over && !self.budget_reported {
-            self.budget_reported = true;
+        if over {
             let message = if too_many {
                 format!("the file unrolls to more than {} operations", self.max_nodes)
             } else {
                 format!("the file evaluates more than {most_evaluations} expressions when it is unrolled")
             };
-            let span = self.user_span(span);
-            let help = match self.has_repeated {
-                true => "make a range shorter, or allow more with --max-nodes",
-                false => "split the file, or allow more with --max-nodes",
-            };
-            self.report(Diagnostic::error(Code::TOO_LARGE, span, message).help(help));
+            let remedy = if self.has_repeated { "make a range shorter" } else { "split the file" };
+            self.report_budget(message, remedy, span);
         }
         over
+    }
+
+    /// Whether so many operations, which are certain to be needed, are within the budget. If not, this is reported
+    /// before the first of them is made: to make them up to the limit may take seconds and gigabytes.
+    pub fn may_unroll(&mut self, operations: f64, remedy: &str, span: Span) -> bool {
+        let fits = operations <= self.max_nodes as f64;
+        if !fits {
+            let message = format!("the file unrolls to more than {} operations", self.max_nodes);
+            self.report_budget(message, remedy, span);
+        }
+        fits
+    }
+
+    fn report_budget(&mut self, message: String, remedy: &str, span: Span) {
+        if !std::mem::replace(&mut self.budget_reported, true) {
+            let span = self.user_span(span);
+            let help = format!("{remedy}, or allow more with --max-nodes");
+            self.report(Diagnostic::error(Code::TOO_LARGE, span, message).help(help));
+        }
     }
 
     pub fn node(&mut self, operation: Operation, span: Span) -> Node {

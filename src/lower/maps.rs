@@ -67,7 +67,8 @@ impl Lowering<'_> {
 
     /// Copies of the shape, the first where it is. If it is proven to fit into one cell of the lattice, each point
     /// looks at the copy in its own cell only: then the number of copies costs nothing. Otherwise copies may reach
-    /// into other cells, and they are joined by *or*.
+    /// into other cells, and they are joined by *or*. Along an axis on which the shape does not depend, all copies are
+    /// the same, so there is one.
     pub fn repeated(
         &mut self,
         shape: Node,
@@ -76,6 +77,8 @@ impl Lowering<'_> {
         span: Span,
     ) -> Option<Node> {
         self.may_repeat((step, step_at), (counts, counts_at))?;
+        let differs = Axis::SPACE.map(|axis| self.module.graph.uses(shape, axis));
+        let counts = std::array::from_fn(|i| if differs[i] { counts[i] } else { 1.0 });
         let bounds = ir::reach(&self.module.graph, shape);
         let fits = |bounds: &Aabb| {
             (0..3).all(|i| counts[i] == 1.0 || bounds.size()[i] <= step[i].abs() * (1.0 + ROUNDING))
@@ -164,6 +167,11 @@ impl Lowering<'_> {
     /// All copies joined. `None` if they are too many, which is reported.
     fn copies(&mut self, shape: Node, (step, counts): ([f64; 3], [f64; 3]), span: Span) -> Option<Node> {
         let p = Axis::SPACE.map(|axis| self.module.graph.coordinate(axis));
+        // no two copies are the same, and each is joined to another one
+        let least = self.module.graph.len() as f64 + 2.0 * counts.iter().product::<f64>();
+        if !self.may_unroll(least, "make fewer copies", span) {
+            return None;
+        }
         let [nx, ny, nz] = counts.map(|count| count as u64);
         let mut all = Vec::new();
         for k in 0..nz {

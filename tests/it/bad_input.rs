@@ -115,7 +115,7 @@ fn many_mistakes() {
 
 #[test]
 fn files_that_unroll_without_end() {
-    check(solid("any i in 0..1e12: sphere(1)"), 1, "a range with 1000000000000 members");
+    check(solid("any i in 0..1e12: sphere(1)"), 1, "unrolls to more than 1000000 operations");
     check(solid("any i in 0..1000: any j in 0..1000: any k in 0..1000: sphere(1)"), 1, "E0210");
     check(solid("any i in 0..1e6: any j in 0..1e6: x"), 1, "E0210");
     check(solid("all i in 0..1000000: sphere(1 + i)"), 1, "E0210");
@@ -128,6 +128,31 @@ fn files_that_unroll_without_end() {
     let text =
         "rfm 1\nfn f0(a) = a\n".to_string() + &(1..60).map(nest).collect::<String>() + "solid s = f59(x)";
     check(text, 1, "unroll too deeply");
+}
+
+/// What is certain to be too much is refused before it is made: ten million members took seconds and gigabytes.
+#[test]
+fn what_unrolls_too_far_is_refused_at_once() {
+    let started = std::time::Instant::now();
+    check(solid("sum i in 0..10000000: x*i"), 1, "make the range shorter, or allow more with --max-nodes");
+    check(solid("sum i in 0..3: sum j in 0..10000000: x*j"), 1, "E0210");
+    let copies = "(x + y + z <= 1).repeat([1, 1, 1], [1000, 1000, 1000])";
+    check(solid(copies), 1, "make fewer copies, or allow more with --max-nodes");
+    check(solid("sphere(1).polar_repeat(1e9)"), 1, "E0210");
+    assert!(started.elapsed() < std::time::Duration::from_secs(4), "{:?}", started.elapsed());
+}
+
+/// Copies along an axis on which a shape does not depend are the shape itself.
+#[test]
+fn copies_that_are_all_the_same_cost_nothing() {
+    let value = |shape: &str| {
+        let outcome = rfm_reading(root(), &["eval", "-", "--at", "0,0,0.5"], solid(shape).as_bytes());
+        outcome.expect(0).stdout
+    };
+    let endless = "(z <= 1).repeat([1, 1, 1000], [1000, 1000, 1000])";
+    let along_z = "(z <= 1).repeat([1, 1, 1000], [1, 1, 1000])";
+    assert_eq!(value(endless), value(along_z));
+    assert_eq!(value("(z <= 1).repeat([1, 1, 1], [1000, 1000, 1])"), value("z <= 1"));
 }
 
 #[test]
