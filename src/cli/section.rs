@@ -58,7 +58,7 @@ pub(super) fn plot(shared: &Shared, options: &Check, program: &Program) -> Resul
 
 /// A solid as it is drawn in a plane.
 struct Seen<'a> {
-    /// What is drawn; if no program keeps the tolerance, which was reported, it is the solid's own ω.
+    /// What is drawn.
     field: Beside<'a>,
     title: String,
     /// The shift of the plane out of a face.
@@ -77,11 +77,10 @@ impl Seen<'_> {
     }
 }
 
-/// Looks at a solid in a plane.
+/// Looks at a solid in a plane, in which a field of it is drawn.
 fn seen<'a>(
     program: &Program,
-    solid: &'a Solid,
-    chosen: Option<&'a Chosen>,
+    (solid, field): (&Solid, &'a dyn Field),
     (plane, window): (Plane, Window),
 ) -> Seen<'a> {
     let aside = out_of_a_face(solid, plane, window);
@@ -93,16 +92,20 @@ fn seen<'a>(
     let named = program.module().solids.iter().find(|named| named.name == solid.name());
     let warning =
         found.zip(named).map(|((code, message), named)| Diagnostic::warning(code, named.span, message));
-    let field: &dyn Field = match chosen {
-        Some(chosen) => chosen,
-        None => solid,
-    };
     let title = match aside {
         Some(_) => format!("{}, just outside its face", solid.name()),
         None => solid.name().to_string(),
     };
     let field = Beside { field, by: shown.point(DVec2::ZERO) - plane.point(DVec2::ZERO) };
     Seen { field, title, is_aside: aside.is_some(), warning }
+}
+
+/// The field that is drawn as ω: a cheaper program of it if a tolerance allows one.
+fn omega_of<'a>(solid: &'a Solid, chosen: Option<&'a Chosen>) -> &'a dyn Field {
+    match chosen {
+        Some(chosen) => chosen,
+        None => solid,
+    }
 }
 
 /// Plots a solid in a plane.
@@ -114,7 +117,7 @@ fn plot_one(
 ) -> Result<Vec<Diagnostic>, Failure> {
     let window = window(options, plane, std::slice::from_ref(solid))?;
     let chosen = program.within_tolerance(solid).and_then(Result::ok);
-    let seen = seen(program, solid, chosen.as_ref(), (plane, window));
+    let seen = seen(program, (solid, omega_of(solid, chosen.as_ref())), (plane, window));
     let (field, title) = (seen.field(), seen.title.as_str());
     let warnings = Vec::from_iter(seen.warning.clone());
     if options.term {
@@ -158,7 +161,6 @@ fn own_name(solid: &Solid, plane: Plane) -> PathBuf {
 
 /// The distance from the surface of a solid, m, positive inside: that from a fine mesh of it.
 struct Depth {
-    name: String,
     distance: MeshDistance,
 }
 
@@ -190,14 +192,13 @@ impl Depth {
                  time"
             ));
         }
-        let name = name.to_string();
         if let Ok(distance) = MeshDistance::of(&sharp) {
-            return Ok(Self { name, distance });
+            return Ok(Self { distance });
         }
         // one without sharp edges never touches itself
         let plain = marching_cubes(&*surface, &grid, &Unwatched).map_err(|error| refused(&error))?;
         let distance = MeshDistance::of(&plain).map_err(|error| refused(&error))?;
-        Ok(Self { name, distance })
+        Ok(Self { distance })
     }
 }
 
@@ -235,11 +236,16 @@ fn plot_sheet(
     };
     let chosen: Vec<_> =
         solids.iter().map(|solid| program.within_tolerance(solid).and_then(Result::ok)).collect();
+    let drawn = solids.iter().zip(&depths).zip(&chosen).map(|((solid, depth), chosen)| match depth {
+        Some(depth) => depth as &dyn Field,
+        None => omega_of(solid, chosen.as_ref()),
+    });
+    let drawn: Vec<&dyn Field> = drawn.collect();
     let mut all = Vec::new();
     for plane in planes {
         let window = window(options, *plane, solids)?;
-        let of = |(solid, chosen)| seen(program, solid, Option::as_ref(chosen), (*plane, window));
-        all.push((*plane, window, solids.iter().zip(&chosen).map(of).collect::<Vec<_>>()));
+        let of = |(solid, field): (&_, &_)| seen(program, (solid, *field), (*plane, window));
+        all.push((*plane, window, solids.iter().zip(&drawn).map(of).collect::<Vec<_>>()));
     }
     let panels: Vec<Panel<'_>> = all
         .iter()
@@ -247,15 +253,7 @@ fn plot_sheet(
             plane: *plane,
             window: *window,
             style,
-            cuts: seen
-                .iter()
-                .zip(&depths)
-                .map(|(seen, depth)| match depth {
-                    // the plane itself is drawn: a distance within a face is 0
-                    Some(depth) => SolidCut { name: depth.name.clone(), field: depth },
-                    None => seen.cut(),
-                })
-                .collect(),
+            cuts: seen.iter().map(Seen::cut).collect(),
         })
         .collect();
     let path = options.output.clone().unwrap_or_else(|| match (planes, solids) {
