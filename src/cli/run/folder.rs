@@ -46,6 +46,11 @@ pub(super) fn of(options: &Run) -> PathBuf {
     }
 }
 
+/// Whether a run has written, or is writing, into a folder.
+pub(super) fn was_held(folder: &Path) -> bool {
+    folder.join(LOCK).is_file()
+}
+
 /// Refuses a folder that holds a sweep, a run which is neither to be replaced nor to be continued, or files
 /// of others that the run of a scene would replace.
 pub(super) fn may_be_written(folder: &Path, options: &Run, scene: &Scene) -> Result<(), Failure> {

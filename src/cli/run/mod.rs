@@ -58,9 +58,14 @@ pub(super) fn run(shared: &Shared, options: &Run) -> Result<(), Failure> {
         frames_fit(options, goal, &experiment)?;
         return forecast::dry_run(shared, options, &experiment, goal, latest()?.as_ref());
     }
+    // a run that is writing there is told of before what it has written so far
+    let again = folder::was_held(&folder).then(|| Hold::take(&folder)).transpose()?;
     folder::may_be_written(&folder, options, experiment.scene())?;
     // a folder that is not there yet is made only after all that can fail
-    let held = folder.exists().then(|| Hold::take(&folder)).transpose()?;
+    let held = match again {
+        None => folder.exists().then(|| Hold::take(&folder)).transpose()?,
+        Some(_) => again,
+    };
     let resumed = latest()?;
     let (mut simulation, carved) = match &resumed {
         Some(checkpoint) => (experiment.resume(checkpoint).map_err(Failure::usage)?, 0),
