@@ -60,8 +60,8 @@ impl Region<'_> {
         if shape.lo > 0.0 && near.is_empty() {
             return within.volume();
         }
-        if halvings == 0 {
-            return self.volume_of_cell(within, &near);
+        if halvings == 1 {
+            return self.volume_of_cells(within, &near);
         }
         let centre = within.centre();
         let parts = within.corners().map(|corner| Aabb::new(corner.min(centre), corner.max(centre)));
@@ -74,18 +74,46 @@ impl Region<'_> {
         parts.into_iter().map(|part| self.volume_of(part, &near, halvings - 1)).sum()
     }
 
-    fn volume_of_cell(&self, within: Aabb, near: &[usize]) -> f64 {
-        let omega = |p: DVec3| {
-            let of_bodies = near.iter().map(|&k| -self.bodies[k].omega(p));
-            of_bodies.fold(self.shape.omega(p), f64::min)
+    /// The volume in the eight cells of a box. Ranges would decide most of them, too, but take longer than the values at
+    /// the corners that cells share.
+    fn volume_of_cells(&self, within: Aabb, near: &[usize]) -> f64 {
+        let (min, centre, max) = (within.min, within.centre(), within.max);
+        let at = |[i, j, k]: [usize; 3]| {
+            DVec3::new([min.x, centre.x, max.x][i], [min.y, centre.y, max.y][j], [min.z, centre.z, max.z][k])
         };
-        let corners = within.corners();
-        let values = corners.map(omega);
+        let values: [f64; 27] =
+            std::array::from_fn(|n| self.free(at([n % 3, n / 3 % 3, n / 9]), near.iter().copied()));
+        let cell = |n: usize| {
+            let low = [n % 2, n / 2 % 2, n / 4];
+            let corner = |m: usize| [low[0] + m % 2, low[1] + m / 2 % 2, low[2] + m / 4];
+            let values: [f64; 8] = std::array::from_fn(|m| {
+                let [i, j, k] = corner(m);
+                values[i + 3 * j + 9 * k]
+            });
+            self.volume_of_cell(Aabb::new(at(corner(0)), at(corner(7))), values, near)
+        };
+        (0..8).map(cell).sum()
+    }
+
+    /// The volume in a cell, with the values at its corners, near which are some of the bodies.
+    fn volume_of_cell(&self, within: Aabb, values: [f64; 8], near: &[usize]) -> f64 {
         match values.map(is_inside) {
             inside if inside.iter().all(|is| *is) => within.volume(),
-            inside if inside.iter().any(|is| *is) => cut(&corners, &values, &omega).inside,
+            inside if inside.iter().any(|is| *is) => {
+                // a body that ends before the cell has no part in its surface
+                let ends_before = |k: usize| self.bodies[k].range(&within).hi < 0.0;
+                let near: Vec<usize> = near.iter().copied().filter(|&k| !ends_before(k)).collect();
+                let omega = |p: DVec3| self.free(p, near.iter().copied());
+                let corners = within.corners();
+                cut(&corners, &corners.map(omega), &omega).inside
+            }
             _ => 0.0,
         }
+    }
+
+    /// Positive in the shape and in none of these bodies.
+    fn free(&self, p: DVec3, bodies: impl Iterator<Item = usize>) -> f64 {
+        bodies.map(|k| -self.bodies[k].omega(p)).fold(self.shape.omega(p), f64::min)
     }
 }
 
