@@ -119,6 +119,9 @@ impl Experiment {
         let scene = Scene { method, ..scene };
         parameters.method = method;
         parameters.support_radius = parameters::support_radius(&scene, mass);
+        if let Some(refusal) = parameters::longer_than_the_run(&scene, &parameters) {
+            return Err(refuse(&program, refusal));
+        }
         let (time_step, too_long) = parameters::time_step(&scene, &parameters);
         parameters.time_step = time_step.seconds;
         let (h, spacing) = (parameters.support_radius, parameters.spacing());

@@ -199,6 +199,21 @@ pub(super) fn time_step(scene: &Scene, parameters: &Parameters) -> (TimeStep, Op
     }
 }
 
+/// The refusal of a step that is longer than the whole run.
+pub(super) fn longer_than_the_run(scene: &Scene, parameters: &Parameters) -> Option<Diagnostic> {
+    let (until, speed) = (scene.run.until, parameters.expected_speed);
+    let dt = scene.run.dt.filter(|dt| *dt > until)?;
+    let stable = parameters.stable_dt(speed);
+    let message = format!("a step of {dt} s is longer than the run of {until} s");
+    let help = format!(
+        "leave `dt` out, or write `dt: {}`: {} are stable up to {speed:.1} m/s, the speed of a fall through the box",
+        time_as_written((0.9 * stable).min(until)),
+        time_as_written(stable)
+    );
+    let at = scene.run.dt_span.unwrap_or(scene.span);
+    Some(Diagnostic::error(Code::OUT_OF_RANGE, at, message).help(help))
+}
+
 /// A warning if the run has too many steps to finish in reasonable time.
 pub(super) fn many_steps(scene: &Scene, parameters: &Parameters) -> Option<Diagnostic> {
     let (shortest, cause) = parameters.shortest_step(parameters.expected_speed);

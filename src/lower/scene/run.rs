@@ -44,15 +44,6 @@ impl<'a> Lowering<'a> {
                 "a run that is interrupted saves one too; without this key there is one with every frame";
             self.report(Diagnostic::warning(Code::FRAMES, value.span, message).help(help));
         }
-        if let (Some(dt), Some(at)) = (run.dt, run.dt_span)
-            && dt > run.until
-        {
-            let [until, step] = times_as_written([run.until, dt]);
-            let message = format!("a step of {step} is longer than the run of {until}");
-            let help = "leave `dt` out: the step is then as long as is stable";
-            self.report(Diagnostic::error(Code::OUT_OF_RANGE, at, message).help(help));
-            return None;
-        }
         let stated = block
             .setting(keys::SAVE_EVERY.name)
             .or(block.setting(keys::UNTIL.name))
