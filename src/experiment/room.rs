@@ -208,12 +208,18 @@ impl Experiment {
             SeedError::TooLarge { sites }
                 if sites.is_finite() && fluid.size_span.is_none() && fluid.particles.is_some() =>
             {
-                let message = format!("so many particles are too many: at most {MAX_SITES:.0e} are possible");
-                no_room(at, message).help(format!("write for example `particles: {:.0}`", 0.2 * MAX_SITES))
+                // the lattice fills the bounds of the shape, and the particles are those of its sites that lie inside
+                let wanted = fluid.particles.unwrap_or_default() as f64;
+                let most = rounded_down(0.98 * wanted * (MAX_SITES / sites).min(1.0));
+                let message = format!(
+                    "{wanted} particles are too many: of the {MAX_SITES:.0e} sites that the lattice around the shape may have, about {most:.1e} lie in it"
+                );
+                let help = format!("write for example `particles: {:.0}`", rounded_down(0.2 * most));
+                no_room(at, message).help(help)
             }
             SeedError::TooLarge { sites } if sites.is_finite() => {
                 let message = format!(
-                    "with {} between particles the shape would hold {sites:.1e} of them; at most {MAX_SITES:.0e} are possible",
+                    "with {} between particles the lattice around the shape would have {sites:.1e} sites; at most {MAX_SITES:.0e} are possible",
                     length(spacing)
                 );
                 let usual = spacing * (sites / USUAL_SITES).cbrt();
@@ -380,9 +386,8 @@ impl Experiment {
         // few particles are counted when they are placed
         let is_certain = fits > 1000.0 && wanted as f64 > 1.1 * fits;
         if is_certain {
-            // rounded down to what fits for certain
-            let unit = 10f64.powf((0.95 * fits).log10().floor() - 1.0);
-            let room = (unit * (0.95 * fits / unit).floor()) as usize;
+            // what fits for certain
+            let room = rounded_down(0.95 * fits) as usize;
             return Err(self.no_fluid(&SeedError::DoesNotFit { wanted, room }));
         }
         Ok(room.min(wanted as f64))
@@ -469,6 +474,12 @@ pub(super) fn quick_fields<'s>(
     over: Aabb,
 ) -> Vec<Box<dyn Walls>> {
     solids.into_iter().map(|solid| quick_field(solid, over)).collect()
+}
+
+/// A count with two digits, rounded down.
+fn rounded_down(count: f64) -> f64 {
+    let unit = 10f64.powf(count.log10().floor() - 1.0);
+    unit * (count / unit).floor()
 }
 
 /// Points in the middles of equal cells that fill a box.
