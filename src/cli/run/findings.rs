@@ -1,7 +1,8 @@
 //! What the audit of a run finds, as warnings with codes.
 
 use rfm::diagnostic::Code;
-use rfm::sph::{Finding, Simulation, short_time};
+use rfm::geom::significant;
+use rfm::sph::{Finding, Simulation};
 
 use super::super::failure::warn;
 
@@ -16,7 +17,7 @@ pub(super) fn code(finding: Finding) -> Code {
 
 /// Warns of what the audit has found since the last call.
 pub(super) fn tell_news(simulation: &mut Simulation) {
-    let (step, time) = (simulation.steps(), short_time(simulation.time()));
+    let (step, time) = (simulation.steps(), significant(simulation.time()));
     for (finding, text) in simulation.news() {
         warn(code(finding), format!("step {step}, {time} s: {text}"));
     }
