@@ -159,6 +159,13 @@ impl MeshSummary {
                 kept.simplify_error,
                 kept.simplify_tolerance
             );
+        } else if let Some(whole) = self.simplified.as_ref().filter(|s| s.simplified_from == self.triangles) {
+            // its distance is that of the mesh, and no loss by the simplification
+            say!(
+                "not simplified: all {} triangles are needed to stay within the {:.2e} allowed",
+                whole.simplified_from,
+                whole.simplify_tolerance
+            );
         } else if let Some(simplified) = &self.simplified {
             say!(
                 "simplified from {} triangles in {:.1} ms: at most {:.2e} from the surface, as measured in {:.1} ms, {:.2e} \
