@@ -65,6 +65,9 @@ use crate::lettering;
 
 const INK: &str = "#1c1c1c";
 
+/// What letters have around them, so that they can be read over particles: a border in the colour of the paper.
+const HALO: &str = r##"paint-order="stroke" stroke="#ffffff" stroke-opacity="0.85" stroke-width="5" stroke-linejoin="round""##;
+
 /// Draws an SVG body on a page of `size` units, at `scale` pixels per unit.
 fn draw(size: (f64, f64), scale: f64, body: &str) -> Result<Layer, RenderError> {
     let svg = format!(
@@ -83,7 +86,7 @@ fn draw(size: (f64, f64), scale: f64, body: &str) -> Result<Layer, RenderError> 
 /// The title, for the upper left corner of a page `width` units wide.
 pub fn title(text: &str, width: f64, scale: f64) -> Result<Layer, RenderError> {
     let text = escaped(text);
-    draw((width, 48.0), scale, &format!(r#"<text x="32" y="36" font-size="22">{text}</text>"#))
+    draw((width, 48.0), scale, &format!(r#"<text x="32" y="36" font-size="22" {HALO}>{text}</text>"#))
 }
 
 /// A text, escaped for SVG.
@@ -131,7 +134,7 @@ pub fn bar(values: &Scale<'_>, scale: f64) -> Result<Layer, RenderError> {
     }
     let _ = write!(
         body,
-        r#"<g font-size="16"><text x="{left}" y="{}">{}</text>"#,
+        r#"<g font-size="16"><text x="{left}" y="{}" {HALO}>{}</text>"#,
         top - 18.0,
         escaped(values.label)
     );
@@ -140,7 +143,7 @@ pub fn bar(values: &Scale<'_>, scale: f64) -> Result<Layer, RenderError> {
         let right = left + width;
         let _ = write!(
             body,
-            r#"<path d="M{right} {y:.2}h5" stroke="{INK}"/><text x="{}" y="{:.2}">{label}</text>"#,
+            r#"<path d="M{right} {y:.2}h5" stroke="{INK}"/><text x="{}" y="{:.2}" {HALO}>{label}</text>"#,
             right + 10.0,
             y + 5.5
         );
@@ -160,7 +163,7 @@ pub fn caption(moment: &Caption, particles: usize, scale: f64) -> Result<Layer, 
     words.extend((particles > 0).then(|| format!("N = {}", grouped(particles as u64))));
     let mut body = String::from(r#"<g font-size="18">"#);
     for (k, words) in words.iter().enumerate() {
-        let _ = write!(body, r#"<text x="{}" y="22">{words}</text>"#, 32 + 140 * k);
+        let _ = write!(body, r#"<text x="{}" y="22" {HALO}>{words}</text>"#, 32 + 140 * k);
     }
     body.push_str("</g>");
     draw((520.0, CAPTION_HEIGHT), scale, &body)
