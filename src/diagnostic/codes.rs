@@ -296,6 +296,12 @@ direction keeps its faces; one that is so thin in all directions keeps none and 
 
     rfm 1
     solid plate = box([0, 0, 0], [4, 3, 0.2]).round(0.15)    # 0.2 thick: a radius of 0.1 keeps its length";
+ANGLE_AS_LENGTH = "W0425":
+"A coordinate is a length in metres, and the angle that it is compared with is a number of radians: `x <= 10 deg` is `x <= 0.17`.
+Where the angle of a place is meant, it is `atan2(y, x)` about the z axis. In a shape that `.at` maps, coordinates may be angles.
+
+    rfm 1
+    solid wedge = x <= 10 deg and box()                      # atan2(y, x) <= 10 deg";
 FLUID_IN_OBSTACLE = "W0501":
 "Part of the fluid's shape lies inside an obstacle, or outside the box or the container. Those particles are carved off before the
 run starts. `rfm run` counts them. `rfm check` and editors estimate by samples how much of the shape is taken, and tell of it where

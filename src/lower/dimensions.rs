@@ -159,11 +159,33 @@ impl Lowering<'_> {
         false
     }
 
+    /// Warns of a coordinate that is compared with an angle, as in `x <= 10 deg`.
+    pub fn warn_of_angle_as_length(&mut self, operands: &[&Expr]) {
+        let is_angle = |operand: &&&Expr| self.dimension(operand) == Some(Dimension::ANGLE);
+        let Some(angle) = operands.iter().find(is_angle).filter(|angle| angle.span.source.is_users()) else {
+            return;
+        };
+        let Some(length) = operands.iter().find(|operand| is_coordinate(operand)) else { return };
+        let written = self.written(angle).unwrap_or("10 deg").to_string();
+        let message = "a coordinate, which is a length, is compared with an angle";
+        self.report(
+            Diagnostic::warning(Code::ANGLE_AS_LENGTH, angle.span, message)
+                .at("taken as a number of radians")
+                .label(length.span, "a length")
+                .help(format!(
+                    "the angle of a place about z is `atan2(y, x)`: write `atan2(y, x) <= {written}`"
+                )),
+        );
+    }
+
     /// Whether an argument may measure what is asked for, as far as its units tell. If not, this is reported. Of a
     /// vector, each component is looked at.
     pub fn measures(&mut self, expr: &Expr, wanted: Measure) -> bool {
         if let ExprKind::Vector(parts) = &expr.kind {
             return parts.iter().all(|part| self.measures(part, wanted));
+        }
+        if wanted == Measure::TurnsPerLength {
+            self.warn_of_turns_in_degrees(expr);
         }
         let Some(found) = self.dimension(expr).filter(|found| !wanted.admits(*found)) else { return true };
         // turns are an angle over 2π, which has the dimension of an angle here
@@ -199,6 +221,18 @@ impl Lowering<'_> {
         };
         self.report(Diagnostic::error(Code::UNIT_MISMATCH, expr.span, message).help(help));
         false
+    }
+}
+
+/// Whether an expression is a coordinate, or one with something added.
+fn is_coordinate(expr: &Expr) -> bool {
+    match &expr.kind {
+        ExprKind::Name(name) => matches!(name.as_str(), "x" | "y" | "z"),
+        ExprKind::Negate(inner) => is_coordinate(inner),
+        ExprKind::Sum { first, rest } => {
+            is_coordinate(first) || rest.iter().any(|(_, term)| is_coordinate(term))
+        }
+        _ => false,
     }
 }
 

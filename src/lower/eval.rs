@@ -141,11 +141,17 @@ impl Lowering<'_> {
         };
         if self.in_shape && ![Dimension::LENGTH, Dimension::ANGLE].contains(&parsed.dimension) {
             let message = format!("`{}` is not a length or an angle", unit.text);
-            return self.fail(
-                Diagnostic::error(Code::UNIT_MISMATCH, unit.span, message).help(
-                    "inside shapes only lengths and angles have units; for another quantity define a name, as in `param w = 3000 rpm`",
-                ),
+            let name = match parsed.dimension {
+                Dimension::TURN_RATE | Dimension::FREQUENCY => "w",
+                Dimension::SPEED => "v",
+                _ => "q",
+            };
+            let help = format!(
+                "inside shapes only lengths and angles have units; define a name above: write `param {name} = {value} {}`, and \
+                 `{name}` here",
+                unit.text
             );
+            return self.fail(Diagnostic::error(Code::UNIT_MISMATCH, unit.span, message).help(help));
         }
         Value::Number(self.constant(value * parsed.factor))
     }
@@ -372,6 +378,7 @@ impl Lowering<'_> {
                 .fail(Diagnostic::error(Code::CHAIN, span, message).help("join the comparisons with `and`"));
         }
         let operands: Vec<&Expr> = std::iter::once(first).chain(rest.iter().map(|(_, _, e)| e)).collect();
+        self.warn_of_angle_as_length(&operands);
         let places: Vec<bool> = operands.iter().map(|operand| names_a_coordinate(operand)).collect();
         let has_place = places.contains(&true);
         let terms: Vec<Option<Node>> = std::iter::zip(operands, places)

@@ -503,7 +503,12 @@ fn number(name: &str, a: &[&str]) -> Option<Words> {
             [one] => written("`[a, b, c]` here", &format!("[{one}, {one}, {one}]")),
             _ => written("`[a, b, c]` here", "[1, 0, 0]"),
         },
-        "range" | "linspace" => written("a fold here", "any i in 0..6: sphere(0.3).move([i, 0, 0])"),
+        "range" => match a {
+            [end] => written("a range is written with dots", &format!("0..{end}")),
+            [start, end] => written("a range is written with dots", &format!("{start}..{end}")),
+            _ => written("a fold here", "any i in 0..6: sphere(0.3).move([i, 0, 0])"),
+        },
+        "linspace" => written("a fold here", "any i in 0..6: sphere(0.3).move([i, 0, 0])"),
         "sum" | "product" | "total" => {
             words("a fold here", "write `sum i in 0..6: e`, or `sum e in [1, 2, 3]: e`")
         }

@@ -307,6 +307,21 @@ impl Lowering<'_> {
         self.report(Diagnostic::warning(Code::LARGE_ANGLE, at.span, message).help(help));
     }
 
+    /// Warns of a number of turns that is usual in degrees, as in `.twist(90)`.
+    pub fn warn_of_turns_in_degrees(&mut self, expr: &Expr) {
+        let ExprKind::Number(number) = without_sign(expr).kind else { return };
+        if !USUAL_IN_DEGREES.contains(&number) || expr.span.source != SourceId::File {
+            return;
+        }
+        let sign = if without_sign(expr).span == expr.span { "" } else { "-" };
+        let message = format!("{number} turns in each metre");
+        let help = format!(
+            "are degrees meant? write `.twist({sign}{})`, which turns by {sign}{number}° in each metre",
+            significant(number / 360.0)
+        );
+        self.report(Diagnostic::warning(Code::LARGE_ANGLE, expr.span, message).help(help));
+    }
+
     /// Warns of a number above a whole turn in an angle that depends on t, as in `.rotate_z(40*sin(t))`. In a product
     /// with t it is a rate of turning, as in `.rotate_z(45*t)`: a number of radians per second is often that large,
     /// so only those are reported that are usual in degrees.

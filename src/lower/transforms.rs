@@ -360,6 +360,17 @@ impl<'a> Lowering<'a> {
     fn scale(&mut self, shape: Node, p: [Node; 3], factor: &Value, at: Span, span: Span) -> Option<Node> {
         let factors = match factor {
             Value::Vector(_) => self.constant_vector(factor, at, "a scale factor")?,
+            Value::List(factors) => {
+                let at = self.user_span(at);
+                let message = format!("a shape is scaled by one factor or by three, found {}", factors.len());
+                let written = self.written_at(at).and_then(|text| text.strip_suffix(']'));
+                let help = match (written, factors.len()) {
+                    (Some(two), 2) => format!("write `.scale({two}, 1])`, which keeps its height"),
+                    _ => "write `.scale([2, 2, 1])` for factors along x, y and z".to_string(),
+                };
+                self.report(Diagnostic::error(Code::WRONG_TYPE, at, message).help(help));
+                return None;
+            }
             other => {
                 let node = self.as_number(other, at)?;
                 [self.as_constant(node, at, "a scale factor")?; 3]

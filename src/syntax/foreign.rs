@@ -115,6 +115,31 @@ pub fn of_a_profile(name: &str, arguments: &str) -> Option<String> {
     }
 }
 
+/// A shape of OpenSCAD with its arguments, as it is called here; `None` for another name.
+pub fn shape(name: &str, arguments: &str) -> Option<String> {
+    let whole = arguments.trim();
+    let (first, rest) = match whole.strip_prefix('[').and_then(|inner| inner.split_once(']')) {
+        Some((size, rest)) => (size, rest),
+        None => whole.split_once(',').unwrap_or((whole, "")),
+    };
+    let (is_centred, has_names) = (rest.contains("true"), first.contains('='));
+    let sides: Vec<&str> = first.split(',').map(str::trim).filter(|side| !side.is_empty()).collect();
+    match (name, &sides[..]) {
+        ("cube", [x, y, z]) if is_centred => Some(format!("box(-[{x}, {y}, {z}]/2, [{x}, {y}, {z}]/2)")),
+        ("cube", [x, y, z]) => Some(format!("box([0, 0, 0], [{x}, {y}, {z}])")),
+        ("cube", [side]) if !has_names => Some(format!("box([0, 0, 0], [{side}, {side}, {side}])")),
+        ("cube", _) => Some("box([0, 0, 0], [1, 1, 1])".into()),
+        ("square", [w, h]) => Some(format!("polygon([[0, 0], [{w}, 0], [{w}, {h}], [0, {h}]])")),
+        ("square", [side]) if !has_names => {
+            Some(format!("polygon([[0, 0], [{side}, 0], [{side}, {side}], [0, {side}]])"))
+        }
+        ("square", _) => Some("polygon([[0, 0], [1, 0], [1, 1], [0, 1]])".into()),
+        ("circle", [r]) if !has_names => Some(format!("(x^2 + y^2 <= {}^2)", operand(r))),
+        ("circle", _) => Some("(x^2 + y^2 <= 1)".into()),
+        _ => None,
+    }
+}
+
 /// The turns that `rotate(…)` means elsewhere: three angles about the axes, or one about z.
 pub fn turned(arguments: &str) -> String {
     let arguments = arguments.trim();
@@ -200,8 +225,8 @@ pub fn quantity(number: &str, word: &str) -> Option<String> {
         "t" | "ton" | "tons" | "tonne" | "tonnes" => (1000.0, "kg"),
         "lb" | "lbs" | "pound" | "pounds" => (0.453_592_37, "kg"),
         "hz" | "HZ" => (1.0, "Hz"),
-        "rps" => (60.0, "rpm"),
-        "RPM" => (1.0, "rpm"),
+        "rps" | "rev/s" | "r/s" | "turn/s" | "turns/s" => (60.0, "rpm"),
+        "RPM" | "rev/min" | "revs/min" | "r/min" | "rot/min" | "turn/min" | "turns/min" => (1.0, "rpm"),
         "newton" | "newtons" => (1.0, "N"),
         "pascal" | "pascals" | "PA" => (1.0, "Pa"),
         "hPa" | "mbar" => (100.0, "Pa"),

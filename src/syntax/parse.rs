@@ -109,11 +109,14 @@ fn syntax_error(source: &Source, start: usize, end: usize, error: &Error<Rule>) 
     let span = Span::new(source.id, at, at + found.len());
     let expects_name = matches!(&error.variant, ErrorVariant::ParsingError { positives, .. }
         if positives.contains(&Rule::name) && !positives.contains(&Rule::number));
+    let slip = Slip { text: &source.text, start, at, found, span };
+    if let Some(diagnostic) = slip.operator_as_a_method() {
+        return diagnostic;
+    }
     if expects_name && KEYWORDS.contains(&found) && !ITEM_WORDS.contains(&found) {
         let message = format!("`{found}` is a word of the language and cannot be a name");
         return Diagnostic::error(Code::SYNTAX, span, message).help("choose another name");
     }
-    let slip = Slip { text: &source.text, start, at, found, span };
     let missing = missing_word(error);
     // what ends a condition in other languages lacks a word here, and a word or number may be a slip within it
     let explained = if missing.is_some() && ENDS_A_VALUE.contains(&found) { None } else { slip.explained() };

@@ -2,6 +2,7 @@
 //! habits from another language.
 
 mod heads;
+mod openscad;
 mod ranges;
 mod units;
 
@@ -82,6 +83,12 @@ impl<'t> Slip<'t> {
                     .help(format!("a mesh from a file is a shape, as in `solid part = mesh({path})`")),
             );
         }
+        if self.found == "import" && !self.on_its_line().trim().is_empty() {
+            return self.import_as_a_value();
+        }
+        if let Some(known) = self.function_without_a_name() {
+            return Some(known);
+        }
         if KEYWORDS.contains(&self.found) && called && !self.ends_an_operand() {
             return self.operator_as_a_function();
         }
@@ -119,6 +126,19 @@ impl<'t> Slip<'t> {
         None
     }
 
+    /// `solid part = import "part.stl"`
+    fn import_as_a_value(&self) -> Option<Diagnostic> {
+        let path = self.after().trim_start().strip_prefix('"')?.split(['"', '\n']).next()?;
+        let path = if fits(&[path]) { path } else { "part.stl" };
+        let help = match is_a_mesh(path) {
+            true => format!("a mesh from a file is a shape, as in `solid part = mesh(\"{path}\")`"),
+            false => format!(
+                "files are imported on a line of their own, as in `import \"{path}\" as parts`; their solids are then `parts.…`"
+            ),
+        };
+        Some(self.unexpected().help(help))
+    }
+
     /// Whether the text in front of the place ends an operand, so that an operator may follow.
     fn ends_an_operand(&self) -> bool {
         self.before()
@@ -146,6 +166,18 @@ impl<'t> Slip<'t> {
         )
     }
 
+    /// `a.and(b)`
+    pub fn operator_as_a_method(&self) -> Option<Diagnostic> {
+        let receiver = self.before().strip_suffix('.').filter(|_| ["and", "or"].contains(&self.found))?;
+        let (left, right) = (last_part(receiver), bracketed(self.after())?.trim());
+        let written = match fits(&[left, right]) {
+            true => format!("{} {} {}", foreign::operand(left), self.found, foreign::operand(right)),
+            false => format!("a {} b", self.found),
+        };
+        let at = format!("`{}` stands between its operands", self.found);
+        Some(self.unexpected().at(at).help(format!("write `{written}`")))
+    }
+
     /// An `import` without a name, or without quotes.
     fn import(&self) -> Option<Diagnostic> {
         let line = self.text[self.start..].trim_start().strip_prefix("import")?;
@@ -160,9 +192,8 @@ impl<'t> Slip<'t> {
             && stem.chars().all(|c| c.is_alphanumeric() || c == '_')
             && !KEYWORDS.contains(&stem);
         let name = if is_name { stem } else { "part" };
-        let mesh = [".stl", ".obj", ".ply"].iter().any(|ending| quoted.to_lowercase().ends_with(ending));
         let message = "an import has a path in quotes and a name";
-        Some(self.syntax(message).help(if mesh {
+        Some(self.syntax(message).help(if is_a_mesh(quoted) {
             format!("a mesh is a solid, as in `solid {name} = mesh(\"{quoted}\")`")
         } else {
             format!("as in `import \"{quoted}\" as {name}`; its solids are then `{name}.…`")
@@ -173,7 +204,7 @@ impl<'t> Slip<'t> {
     fn first_word(&self) -> Diagnostic {
         let word = self.found;
         let after = self.after().trim_start_matches([' ', '\t']);
-        if let Some(diagnostic) = self.block_without_braces() {
+        if let Some(diagnostic) = self.block_without_braces().or_else(|| self.loop_of_its_own()) {
             return diagnostic;
         }
         if let Some(help) = foreign::item(word) {
@@ -201,34 +232,6 @@ impl<'t> Slip<'t> {
         self.unexpected()
             .at("expected an item or the rest of the one above")
             .help("items start with `param`, `let`, `fn`, `solid` or `scene`")
-    }
-
-    /// `translate([1, 0, 0]) sphere(1)`
-    fn transform_in_front(&self) -> Option<Diagnostic> {
-        let before = self.on_its_line().trim_end();
-        let open = opening(before)?;
-        let name = last_word(&before[..open]);
-        let shape = format!("{}({})", self.found, bracketed(self.after())?);
-        let follows_a_method = before[..open].strip_suffix(name).is_some_and(|heads| heads.ends_with('.'));
-        if follows_a_method && foreign::method(self.found).is_some() {
-            let written = if fits(&[&shape]) { shape } else { format!("{}(…)", self.found) };
-            return Some(self.unexpected().help(format!("a method follows a point: write `.{written}`")));
-        }
-        let arguments = &before[open + 1..before.len() - 1];
-        if let Some(call) = foreign::of_a_profile(name, arguments).filter(|_| !follows_a_method) {
-            let shape = if fits(&[&shape]) { shape } else { "profile".into() };
-            return Some(
-                self.unexpected()
-                    .at("a method stands behind its shape")
-                    .help(format!("write `{shape}{call}`")),
-            );
-        }
-        let method = foreign::method(name).filter(|_| !follows_a_method)?;
-        let written = match (fits(&[&shape, arguments]), foreign::method_call(name, arguments)) {
-            (true, Some(call)) => format!("{shape}{call}"),
-            _ => format!("shape.{method}(…)"),
-        };
-        Some(self.unexpected().at("a method stands behind its shape").help(format!("write `{written}`")))
     }
 
     fn comment(&self) -> Option<Diagnostic> {
@@ -374,6 +377,9 @@ impl<'t> Slip<'t> {
     /// A character that has no meaning where it stands.
     fn mark(&self) -> Option<Diagnostic> {
         let (before, after) = (self.before(), self.after());
+        if let Some(known) = self.range_in_square_brackets().or_else(|| self.special_variable()) {
+            return Some(known);
+        }
         if let Some(known) = self.range_as_a_vector().or_else(|| self.member_of_a_range()) {
             return Some(known);
         }
@@ -426,6 +432,11 @@ impl<'t> Slip<'t> {
         };
         Some(self.unexpected().help(help))
     }
+}
+
+/// Whether a path is that of a mesh, by its ending.
+fn is_a_mesh(path: &str) -> bool {
+    [".stl", ".obj", ".ply"].iter().any(|ending| path.to_lowercase().ends_with(ending))
 }
 
 /// Whether the text ends in a number rather than in a name such as `r2`.

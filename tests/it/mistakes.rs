@@ -3,6 +3,7 @@
 
 mod commands;
 mod half_remembered;
+mod openscad;
 mod scenes;
 
 use rfm::diagnostic::{Diagnostics, Source};

@@ -398,7 +398,8 @@ impl<'a> Lowering<'a> {
         if number.fract() == 0.0 && number >= f64::from(least) && number <= MOST {
             return Some(Some(number as usize));
         }
-        let message = format!("`{key}` must be a whole number from {least} to {MOST}, found {number}");
+        let bound = if number > MOST { format!("at most {MOST}") } else { format!("at least {least}") };
+        let message = format!("`{key}` must be a whole number of {bound}, found {number}");
         self.report(Diagnostic::error(Code::OUT_OF_RANGE, value.span, message));
         None
     }
@@ -441,6 +442,12 @@ impl<'a> Lowering<'a> {
                                     .is_some_and(|kinematic| kinematic.dimension == parsed.dimension) =>
                         {
                             DYNAMIC.into()
+                        }
+                        // a unit with a part missing, as `m/s` for an acceleration
+                        Some(whole) if whole.starts_with(&unit.text) => {
+                            let before = self.text.get(..expr.span.range().start).unwrap_or_default();
+                            let sign = if before.ends_with('-') { "-" } else { "" };
+                            format!("write `{sign}{value} {whole}`")
                         }
                         Some(unit) => format!("write for example `1 {unit}`"),
                         None => format!("`{key}` has no unit"),

@@ -270,7 +270,7 @@ fn has_equals(text: &str) -> bool {
 }
 
 /// The value of a step: `2*k`, `1 + 2*k` or `5 - k`.
-fn multiple(start: &str, step: &str, variable: &str) -> String {
+pub(super) fn multiple(start: &str, step: &str, variable: &str) -> String {
     let (sign, step) = match step.strip_prefix('-') {
         Some(rest) => ('-', rest.trim_start()),
         None => ('+', step),
@@ -289,7 +289,7 @@ fn multiple(start: &str, step: &str, variable: &str) -> String {
 
 /// A formula with a value in place of a name: in brackets, unless it stands alone between commas or brackets. The
 /// name of an argument stays.
-fn replaced(formula: &str, name: &str, value: &str) -> String {
+pub(super) fn replaced(formula: &str, name: &str, value: &str) -> String {
     let is_part = |c: char| c.is_alphanumeric() || c == '_';
     let mut written = String::new();
     let mut rest = formula;

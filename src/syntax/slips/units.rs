@@ -1,7 +1,7 @@
 //! Slips in units: behind formulas, of other systems, and in other spellings.
 
 use super::super::foreign;
-use super::{Slip, fits, last_part, last_word, number_ends};
+use super::{Slip, fits, last_part, last_word, number_ends, token_end, words};
 use crate::diagnostic::{Code, Diagnostic, Span, nearest};
 use crate::quantity::parse_unit;
 
@@ -21,14 +21,16 @@ impl Slip<'_> {
         if word == "in" && is_range() {
             return unknown.help("only a param has a range, as in `param d = 2 in 0 .. 5`");
         }
-        if let Some(written) = foreign::quantity(number, word) {
-            let line = self.on_its_line().trim_end();
-            let before = line.strip_suffix(number).unwrap_or(line);
-            // `1/2 inch` is half of one
-            return unknown.help(match foreign::quantity("1", word).filter(|_| before.ends_with('/')) {
-                Some(one) => format!("write `{}*{one}`", last_part(line)),
-                None => format!("write `{written}`"),
-            });
+        if let Some(known) = self.unit_of_another_system(number) {
+            return known;
+        }
+        if word == "to" {
+            return self.range_with_to(number);
+        }
+        if matches!(word, "e" | "E") && self.after().starts_with([')', ',', ']', ' ', '\n']) {
+            let message = format!("`{number}{word}` has no exponent");
+            let help = format!("write `{number}`, or with a power of ten `{number}e3`");
+            return Diagnostic::error(Code::SYNTAX, self.span, message).help(help);
         }
         if word == "pi" {
             return unknown.help(format!("a product has a sign: write `{number}*pi`"));
@@ -48,9 +50,52 @@ impl Slip<'_> {
         {
             return unknown.help(format!("is `{meant}` meant? write `{written}`"));
         }
+        let is_name = |other: &&str| other.as_ptr() != word.as_ptr() && *other == word;
+        let is_known = ["x", "y", "z", "t"].contains(&word) || words(self.text).any(|w| is_name(&w));
         unknown
-            .help(format!("a word after a number is its unit; to multiply, write `{number}*{word}`"))
+            .help(match is_known {
+                true => format!("a word after a number is its unit; to multiply, write `{number}*{word}`"),
+                false => "a word after a number is its unit, such as `mm`, `kg` or `deg`".to_string(),
+            })
             .suggest(word, UNITS.into_iter().filter(|_| word.chars().count() > 1))
+    }
+
+    /// `5 inch`, `3000 rev/min`: a unit that is converted.
+    fn unit_of_another_system(&self, number: &str) -> Option<Diagnostic> {
+        let word = self.found;
+        let divisor = self.after().strip_prefix('/').map(|behind| &behind[..token_end(behind)]);
+        let divisor = divisor.filter(|divisor| parse_unit(divisor).is_some());
+        let per = divisor.map_or(String::new(), |divisor| format!("/{divisor}"));
+        let unit = format!("{word}{per}");
+        let converted = |number: &str| {
+            let of_one = || foreign::quantity(number, word).map(|written| format!("{written}{per}"));
+            foreign::quantity(number, &unit).or_else(of_one)
+        };
+        let written = converted(number)?;
+        let line = self.on_its_line().trim_end();
+        let before = line.strip_suffix(number).unwrap_or(line);
+        let span = Span::new(self.span.source, self.at, self.at + unit.len());
+        let message = format!("unknown unit `{unit}` after a number");
+        // `1/2 inch` is half of one
+        let help = match converted("1").filter(|_| before.ends_with('/')) {
+            Some(one) => format!("write `{}*{one}`", last_part(line)),
+            None => format!("write `{written}`"),
+        };
+        Some(Diagnostic::error(Code::UNKNOWN_UNIT, span, message).at("not a unit").help(help))
+    }
+
+    /// `0 to 5`, of a param or of a fold, in which both ends are meant.
+    fn range_with_to(&self, start: &str) -> Diagnostic {
+        let end = self.after().trim_start();
+        let end = &end[..token_end(end)];
+        let of_a_param = self.on_its_line().trim_start().starts_with("param ");
+        let range = match end.parse::<u64>() {
+            _ if of_a_param && fits(&[end]) => format!("{start} .. {end}"),
+            Ok(last) if last < u64::MAX => format!("{start}..{}", last + 1),
+            Ok(_) | Err(_) => "0..6".to_string(),
+        };
+        let ends = if of_a_param { "" } else { ", and ends before its second number" };
+        self.unexpected().help(format!("a range is written with dots{ends}: write `{range}`"))
     }
 
     /// `n mm`, `(1 + n) mm`: a unit behind something that is no number.
@@ -126,13 +171,12 @@ impl Slip<'_> {
             !base.is_empty() && (parse_unit(base).is_some() || foreign::quantity("1", base).is_some())
         };
         let is_part = |c: char| c.is_alphanumeric() || c == '_' || c == '°';
-        if !words.iter().all(|word| base(word).chars().all(is_part))
-            || words.len() > 1 && !words.iter().all(is_unit)
-        {
+        let own = spelled(unit);
+        let is_known = foreign::quantity("1", &own).is_some() || words.iter().all(is_unit);
+        if !words.iter().all(|word| base(word).chars().all(is_part)) || words.len() > 1 && !is_known {
             return None;
         }
         let span = Span::new(self.span.source, start, start + unit.len());
-        let own = spelled(unit);
         let written = match parse_unit(&own) {
             Some(_) => Some(format!("{number} {own}")),
             None => foreign::quantity(number, &own),
