@@ -52,7 +52,7 @@ use clap::FromArgMatches;
 use clap::error::{ContextKind, ContextValue};
 use rfm::diagnostic::{is_hidden, printable};
 use rfm::lower::vocabulary;
-use rfm::quantity::parse_quantity;
+use rfm::quantity::{parse_quantity, parse_unit};
 
 use failure::{Failure, note};
 
@@ -139,13 +139,41 @@ fn hint(error: &clap::Error) -> Option<String> {
     if argument.parse::<f64>().is_ok() && std::env::args().any(|flag| flag == "--at") {
         return Some("the numbers of a point are joined by commas, as in `--at 1,2,3`".into());
     }
+    if let Some(number) = argument_before(argument).filter(|number| number.parse::<f64>().is_ok())
+        && parse_unit(argument).is_some()
+    {
+        return Some(format!(
+            "a number and its unit are one argument: write `{number}{argument}`, or `\"{number} {argument}\"` in quotes"
+        ));
+    }
     let key = argument.strip_prefix("--")?.replace('-', "_");
+    if let Some(file) = file_with_param(&key) {
+        let value = std::env::args().skip_while(|given| given != argument).nth(1);
+        let value = value.filter(|value| parse_quantity(value).is_ok()).unwrap_or_else(|| "…".into());
+        return Some(format!("`{key}` is a param of `{}`: write `-D {key}={value}`", printable(&file)));
+    }
     vocabulary::is_key(&key).then(|| {
         format!(
             "`{key}` is a key of scenes: to set it from here let it be a param of the file, as in \
              `param p = …` and `{key}: p`, and write `-D p=…`"
         )
     })
+}
+
+/// The argument in front of another one.
+fn argument_before(argument: &str) -> Option<String> {
+    let all: Vec<String> = std::env::args().collect();
+    let at = all.iter().position(|given| given == argument)?;
+    all.get(at.checked_sub(1)?).cloned()
+}
+
+/// The file among the arguments that declares a param of this name.
+fn file_with_param(name: &str) -> Option<String> {
+    let declares = |line: &str| {
+        line.strip_prefix("param ").is_some_and(|rest| rest.split(['=', ' ']).next() == Some(name))
+    };
+    let mut files = std::env::args().filter(|argument| argument.ends_with(".rfm"));
+    files.find(|file| std::fs::read_to_string(file).is_ok_and(|text| text.lines().any(declares)))
 }
 
 /// The command that does the same as the command of this name in other programs; `None` if no other program

@@ -29,8 +29,9 @@ use rfm::view::{Array, Levels};
 pub(super) fn run(shared: &Shared, options: &Render) -> Result<(), Failure> {
     let folder = options.subject.as_path();
     if let Some(flag) = options.flag_of_solids() {
+        let instead = if flag == "--time" { ": choose frames by --times 0.5..2 or --frames 40" } else { "" };
         return Err(Failure::usage(format!(
-            "{flag} is for a solid of a file, and `{}` is the folder of a run",
+            "{flag} is for a solid of a file, and `{}` is the folder of a run{instead}",
             folder.shown()
         )));
     }

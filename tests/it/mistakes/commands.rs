@@ -69,6 +69,9 @@ const COMMANDS: &[(&[&str], i32)] = &[
     (&["run", "post.rfm", "--save-every", "0.1"], 2),
     (&["check", "post.rfm", "-D", "particles=1000"], 2),
     (&["check", "post.rfm", "-s", "post", "--slice", "z=0.1,z=5", "-o", "s.svg"], 0),
+    (&["run", "post.rfm", "--until", "1", "s"], 2),
+    (&["run", "post.rfm", "--rate", "20rpm"], 2),
+    (&["render", "post.out", "--time", "0.5"], 2),
 ];
 
 #[test]
