@@ -9,7 +9,7 @@ use serde::Deserialize;
 use super::failure::Failure;
 use super::output::{Shown, counted};
 use super::values::Frames;
-use rfm::fluid_surface::{FrameEntry, read_collection};
+use rfm::fluid_surface::{FrameEntry, PointArray, read_arrays, read_collection};
 use rfm::geom::Aabb;
 use rfm::sph::Probe;
 
@@ -24,8 +24,13 @@ pub(super) const OWN_TABLES: [(&str, Probe); 2] = [("energy", Probe::Energy), ("
 pub(super) struct RunFigures {
     pub particle_mass: f64,
     pub rest_density: f64,
+    /// The file of the scene, without its folder; empty in folders of earlier versions, as the method is.
+    #[serde(default)]
+    pub file: String,
     #[serde(default)]
     pub scene: String,
+    #[serde(default)]
+    pub method: String,
     /// The names of the obstacles, in the order of the array `body` of their mesh.
     #[serde(default)]
     pub obstacles: Vec<String>,
@@ -101,6 +106,14 @@ pub(super) fn obstacles(folder: &Path, entries: &[(usize, FrameEntry)]) -> Resul
     Ok((Vec::new(), vec![None; entries.len()]))
 }
 
+/// What pictures of a run are of: its file, its scene and its method, or the folder if the run does not tell.
+pub(super) fn subject(folder: &Path, figures: Option<&RunFigures>) -> Vec<String> {
+    let file = figures.map(|figures| figures.file.as_str()).filter(|file| !file.is_empty());
+    let file = file.map_or_else(|| title(folder), |file| Path::new(file).shown());
+    let told = figures.into_iter().flat_map(|figures| [&figures.scene, &figures.method]);
+    std::iter::once(file).chain(told.filter(|word| !word.is_empty()).cloned()).collect()
+}
+
 /// The name of a run's folder.
 pub(super) fn title(folder: &Path) -> String {
     let whole = std::path::absolute(folder).unwrap_or_else(|_| folder.to_path_buf());
@@ -112,6 +125,13 @@ pub(super) fn listed(path: &Path) -> Result<Vec<FrameEntry>, Failure> {
     let failed = |error: String| Failure::usage(format!("cannot read `{}`: {error}", path.shown()));
     let text = std::fs::read_to_string(path).map_err(|error| failed(error.to_string()))?;
     read_collection(&text).map_err(|error| failed(error.to_string()))
+}
+
+/// The places of the particles of a frame, and the values at them.
+pub(super) fn arrays(path: &Path) -> Result<(Vec<DVec3>, Vec<PointArray>), Failure> {
+    let failed = |error: String| Failure::usage(format!("cannot read the frame `{}`: {error}", path.shown()));
+    let file = std::fs::read(path).map_err(|error| failed(error.to_string()))?;
+    read_arrays(&file).map_err(|error| failed(error.to_string()))
 }
 
 /// Refuses frames whose file is missing.

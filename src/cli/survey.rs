@@ -6,9 +6,8 @@ use glam::DVec3;
 use rayon::prelude::*;
 
 use super::failure::Failure;
-use super::saved::RunFigures;
-use crate::cli::output::Shown;
-use rfm::fluid_surface::{FrameEntry, PointArray, read_arrays};
+use super::saved::{self, RunFigures};
+use rfm::fluid_surface::{FrameEntry, PointArray};
 use rfm::geom::Aabb;
 use rfm::view::Levels;
 
@@ -36,12 +35,7 @@ impl Survey {
         let surveys: Result<Vec<Self>, Failure> = entries
             .par_iter()
             .map(|(_, entry)| {
-                let path = folder.join(&entry.file);
-                let failed = |error: String| {
-                    Failure::usage(format!("cannot read the frame `{}`: {error}", path.shown()))
-                };
-                let file = std::fs::read(&path).map_err(|error| failed(error.to_string()))?;
-                let (points, arrays) = read_arrays(&file).map_err(|error| failed(error.to_string()))?;
+                let (points, arrays) = saved::arrays(&folder.join(&entry.file))?;
                 Ok(Self::of_frame(&points, &arrays))
             })
             .collect();

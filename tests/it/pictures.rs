@@ -143,8 +143,63 @@ fn a_plane_within_a_face_shows_what_lies_outside_of_it() {
     assert!(outline(&picture).abs_diff(outline(&above)) <= 2 && outline(&picture) < 60);
     let (told, picture) = check("z=0.1");
     assert!(told.is_empty() && !picture.contains("outside its face"), "{told}");
+    // so is that of distances, whose sign rounding would decide in the face itself
+    let distances = ["check", "step.rfm", "--slice", "z=0.2", "--plot", "distance", "-o", "d.svg"];
+    let told = rfm(folder.path(), &distances).expect(0).stderr;
+    let picture = std::fs::read_to_string(folder.path().join("d.svg")).unwrap();
+    assert!(told.contains("W0414") && picture.contains("just outside its face"), "{told}");
+    assert!(!picture.contains("e-1") && !picture.contains("e−1"), "the bar has numbers of rounding");
 
     let outcome = rfm(folder.path(), &["check", "step.rfm", "--slice", "z=5", "--json"]).expect(0);
     assert_eq!(outcome.json()["diagnostics"][0]["code"], "W0413");
     assert!(outcome.stderr.is_empty(), "{}", outcome.stderr);
+}
+
+/// Colours are chosen before anything is known of the flow. At the end they fit it, and one scale holds for all pictures.
+#[test]
+fn colours_fit_a_fluid_that_is_slower_than_was_expected() {
+    let folder = tempfile::tempdir().unwrap();
+    let scene = |picture: &str| {
+        format!(
+            "rfm 1
+solid post = cylinder(0.1, 0.2).move([0.5, 0.5, 0])
+scene rest {{
+  box {{ max: [1, 1, 1] }}
+  fluid {{ shape: ball([0.5, 0.5, 0.5], 0.2), spacing: 5 cm, velocity: [0.1*sin(20*x), 0, 0] }}
+  obstacle {{ solid: post }}
+  gravity: [0, 0, -0.3]
+  method: wcsph
+  run {{ until: 20 ms, save_every: 10 ms }}
+  {picture}
+}}
+"
+        )
+    };
+    let run = |name: &str, text: String| {
+        let file = format!("{name}.rfm");
+        std::fs::write(folder.path().join(&file), text).unwrap();
+        let arguments = ["run", &file, "--threads", "1", "--mesh-cells", "16", "-o", name];
+        rfm(folder.path(), &arguments).expect(0).stdout
+    };
+    let told = run("own", scene(""));
+    let (_, end) = told.split_once("drawn again with colours up to ").unwrap_or_else(|| panic!("{told}"));
+    let end = end.split_once(" m/s").unwrap().0;
+    let stated = scene(&format!("picture {{ fastest: {end} m/s }}"));
+    let told = run("stated", stated);
+    assert!(!told.contains("drawn again"), "{told}");
+    // all but the title is the same
+    let pixels = |folder_of: &str, number: usize| {
+        let path = folder.path().join(format!("{folder_of}/pictures/frame_{number:06}.png"));
+        let mut reader = png::Decoder::new(std::io::BufReader::new(std::fs::File::open(path).unwrap()))
+            .read_info()
+            .unwrap();
+        let mut pixels = vec![0; reader.output_buffer_size().unwrap()];
+        let info = reader.next_frame(&mut pixels).unwrap();
+        pixels.split_off(pixels.len() / 12 / info.line_size * info.line_size)
+    };
+    for number in 0..3 {
+        let [own, stated] = ["own", "stated"].map(|name| pixels(name, number));
+        let differ = own.iter().zip(&stated).filter(|(a, b)| a.abs_diff(**b) > 8).count();
+        assert!(differ < own.len() / 1000, "frame {number}: {differ} of {}", own.len());
+    }
 }

@@ -37,9 +37,11 @@ const FILES: [Entry; 13] = [
     ("checkpoints/*", "", "the last two whole states, from which `--resume` goes on"),
 ];
 
-const SUMMARY: [Entry; 41] = [
+const SUMMARY: [Entry; 43] = [
     ("schema", "", "the number of this form, 1: keys may be added to it, and none changes its meaning"),
+    ("file", "", "the name of the file, without its folder"),
     ("scene", "", "the name of the scene"),
+    ("method", "", "the method"),
     ("obstacles", "", "the names of the obstacles, in the order of the array `body`"),
     ("steps", "", "the number of steps from the start"),
     ("simulated_seconds", "s", "the time at the end"),

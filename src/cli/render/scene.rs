@@ -106,8 +106,7 @@ impl RunScene {
         let drawn = bodies.drawn(options, &camera)?;
         let names: Vec<&str> = bodies.names.iter().map(String::as_str).collect();
         let title = options.title.clone().unwrap_or_else(|| {
-            let scene = figures.map(|figures| figures.scene).filter(|scene| !scene.is_empty());
-            let words = std::iter::once(saved::title(folder)).chain(scene);
+            let words = saved::subject(folder, figures.as_ref()).into_iter();
             words.chain(scenery::described(&names, &drawn)).collect::<Vec<_>>().join(" · ")
         });
         let surfaces = match options.surface {

@@ -11,7 +11,7 @@ use anstream::println;
 use serde::Serialize;
 
 use super::super::run::bodies::Bodies;
-use super::super::run::pictures::{Look, Pictures};
+use super::super::run::pictures::{Look, Pictures, Seen};
 use super::super::shared::Shared;
 use super::super::stopwatch::processor_seconds;
 use super::super::{Failure, choose, input, output, progress};
@@ -56,7 +56,6 @@ pub(super) fn run(
     scene: &Scene,
     options: &Report,
 ) -> Result<(), Failure> {
-    let (file, _) = choose::subject(&options.subject);
     let (picture, options, html) = (options.output.as_deref(), &options.flow, options.html.as_deref());
     let Some(truth) = scene.truth else {
         return Err(Failure::usage(format!(
@@ -73,7 +72,7 @@ pub(super) fn run(
     let mut study = Study {
         shared,
         scene: &scene.name,
-        seen: html.map(|_| file),
+        is_seen: html.is_some(),
         picture: None,
         instants: 0,
         bar: bar(&sizes, methods.len()),
@@ -175,8 +174,8 @@ fn sizes(program: &Program, asked: &[usize]) -> Result<Vec<Option<usize>>, Failu
 struct Study<'a> {
     shared: &'a Shared,
     scene: &'a str,
-    /// The file of the scene, if a picture of the fluid is wanted.
-    seen: Option<&'a Path>,
+    /// Whether a picture of the fluid is wanted.
+    is_seen: bool,
     /// The fluid at the end of the finest run that did not fail.
     picture: Option<Figure>,
     instants: usize,
@@ -265,10 +264,8 @@ impl Study<'_> {
         }
         self.bar.set_position(before + work(size) as u64);
         self.instants = self.instants.max(deviations.instants());
-        if failure.is_none()
-            && let Some(file) = self.seen
-        {
-            self.picture = Some(seen(file, &experiment, &simulation)?);
+        if failure.is_none() && self.is_seen {
+            self.picture = Some(seen(&experiment, &simulation)?);
         }
         let deviation = if failure.is_none() { deviations.total() } else { Deviation::default() };
         Ok(FlowRun::of(&simulation, deviation, [cpu_seconds, seconds], failure))
@@ -276,14 +273,14 @@ impl Study<'_> {
 }
 
 /// The fluid of a run, where it is now.
-fn seen(file: &Path, experiment: &Experiment, simulation: &Simulation) -> Result<Figure, Failure> {
-    let look = Look { file, camera: None, cut: None, hide: &[], glass: &[], surface: None };
+fn seen(experiment: &Experiment, simulation: &Simulation) -> Result<Figure, Failure> {
+    let look = Look { camera: None, cut: None, hide: &[], glass: &[], surface: None, fastest: None };
     let solids = experiment.bodies().iter().map(|body| body.solid.clone()).collect();
     let bodies = Bodies::of(solids, experiment.domain(), CELLS);
     let mut pictures = Pictures::new(look, experiment, &bodies.meshes_at(0.0)?)?;
     pictures.show(&bodies.meshes_at(simulation.time())?);
     let mut png = Vec::new();
-    pictures.image(simulation)?.write_png(&mut png)?;
+    pictures.image(Seen::of(simulation))?.write_png(&mut png)?;
     let (method, particles) = (experiment.parameters().method.name(), simulation.particles().len());
     let time = simulation.time();
     Ok(Figure::png(

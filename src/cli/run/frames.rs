@@ -10,20 +10,27 @@ use super::super::failure::warn;
 use super::super::stopwatch::Stopwatch;
 use super::super::{Failure, output};
 use super::bodies::Bodies;
-use super::pictures::{Look, Pictures};
+use super::pictures::{Look, Pictures, Seen};
 use super::{checkpoints, folder, paraview, probes};
 use crate::cli::output::{Shown, counted};
-use crate::cli::surfaces;
+use crate::cli::{saved, surfaces};
 use rfm::Experiment;
 use rfm::diagnostic::Code;
 use rfm::mesh::{self, Mesh};
 use rfm::sph::{self, Checkpoint, Simulation, short_time};
+use rfm::view::Levels;
 
 /// Meshes of a run are in the unit of its frames.
 const METRE: mesh::LengthUnit = mesh::LengthUnit::METRE;
 
-/// Name of the frames' times in a checkpoint.
+/// Names of the frames' times, steps and greatest speeds in a checkpoint.
 const TIMES: &str = "frames";
+const STEPS: &str = "steps of frames";
+const SPEEDS: &str = "speeds of frames";
+
+/// The part of a frame's particles that may be faster than the speed at the end of the colours: a few fast ones near a
+/// blade or in a jet would leave the others without a colour.
+const STRAY: f64 = 0.02;
 
 /// The frames and pictures of a run.
 pub(super) struct Frames {
@@ -42,6 +49,9 @@ pub(super) struct Frames {
 struct Saved {
     /// Its time, s.
     time: f64,
+    /// The number of steps until then, and the greatest speed of most particles, m/s; `None` if an earlier version saved it.
+    step: Option<u64>,
+    fastest: Option<f64>,
     /// Its file, relative to the folder of the run.
     file: String,
     /// Whether the file is missing, although the run saved it before it was resumed.
@@ -110,9 +120,11 @@ impl Frames {
             return Ok(());
         }
         self.count = times.len();
+        let [steps, speeds] = [STEPS, SPEEDS].map(|name| checkpoint.get(name).unwrap_or_default());
         let saved = times.iter().enumerate().map(|(number, &time)| {
             let file = frame_name(number);
-            Saved { time, is_lost: !self.folder.join(&file).is_file(), file }
+            let (step, fastest) = (steps.get(number).map(|step| *step as u64), speeds.get(number).copied());
+            Saved { time, step, fastest, is_lost: !self.folder.join(&file).is_file(), file }
         });
         self.saved = saved.collect();
         self.tell_of_lost();
@@ -149,11 +161,14 @@ impl Frames {
     /// Puts into a checkpoint which frames there are. A frame that was saved out of turn, because the run
     /// ended, is left out: a resumed run has the frames of one that never stopped.
     pub fn remember(&self, checkpoint: &mut Checkpoint, in_turn: bool) {
-        let mut times: Vec<f64> = self.saved.iter().map(|saved| saved.time).collect();
-        if !in_turn && self.last_time == checkpoint.time {
-            times.pop();
+        let out_of_turn = usize::from(!in_turn && self.last_time == checkpoint.time);
+        let kept = &self.saved[..self.saved.len().saturating_sub(out_of_turn)];
+        checkpoint.set(TIMES, kept.iter().map(|saved| saved.time).collect());
+        let steps: Option<Vec<f64>> = kept.iter().map(|saved| saved.step.map(|step| step as f64)).collect();
+        let speeds: Option<Vec<f64>> = kept.iter().map(|saved| saved.fastest).collect();
+        for (name, values) in [(STEPS, steps), (SPEEDS, speeds)] {
+            checkpoint.set(name, values.unwrap_or_default());
         }
-        checkpoint.set(TIMES, times);
     }
 
     pub fn folder(&self) -> &Path {
@@ -191,10 +206,35 @@ impl Frames {
         parts.join(", ")
     }
 
-    /// The speed at the end of the pictures' colours, m/s, if a fluid with this greatest speed has little
-    /// more than one of them.
-    pub fn pale(&self, max_speed: f64) -> Option<f64> {
-        self.pictures.as_ref().and_then(|pictures| pictures.pale(max_speed))
+    /// Draws all pictures again if their colours do not fit the speeds of all frames together, so that one scale holds for
+    /// all of them. Returns the new end of the colours, m/s.
+    pub fn fit_colours(&mut self, options: &Run, experiment: &Experiment) -> Result<Option<f64>, Failure> {
+        let Some(pictures) = &self.pictures else { return Ok(None) };
+        let fastest = self
+            .saved
+            .iter()
+            .map(|saved| saved.fastest)
+            .try_fold(0.0, |most: f64, one| one.map(|one| most.max(one)));
+        let better = fastest.and_then(|fastest| pictures.better_end(fastest));
+        // pictures before a resumed run went on may have been drawn again at its first end
+        let Some(end) = better.or(pictures.expected.filter(|_| options.resume)) else { return Ok(None) };
+        let meshes = self.bodies.meshes_at_start()?;
+        let look = Look { fastest: Some(end), ..Look::of(options) };
+        let mut pictures = Pictures::new(look, experiment, &meshes)?;
+        let has_steps = self.saved.iter().all(|saved| saved.step.is_some());
+        for (number, saved) in self.saved.iter().enumerate().filter(|(_, saved)| !saved.is_lost) {
+            let (places, arrays) = saved::arrays(&self.folder.join(&saved.file))?;
+            let speeds = arrays.into_iter().find(|array| array.name == "speed");
+            let speeds = speeds.map_or_else(Vec::new, |array| array.values);
+            if self.bodies.move_about() {
+                pictures.show(&self.bodies.meshes_at(saved.time)?);
+            }
+            let seen = Seen { places, speeds, time: saved.time, step: saved.step.filter(|_| has_steps) };
+            pictures.save(&self.folder.join(picture_name(number)), seen)?;
+        }
+        pictures.count = self.count;
+        self.pictures = Some(pictures);
+        Ok(better)
     }
 
     /// Saves the present state as a frame and a picture.
@@ -211,13 +251,15 @@ impl Frames {
             let path = self.folder.join(obstacle_name(self.count));
             output::write(&path, |mut out| mesh::vtp::write_bodies(meshes, METRE, &mut out))?;
         }
-        self.saved.push(Saved { time: simulation.time(), file: name, is_lost: false });
+        let seen = Seen::of(simulation);
+        let fastest = Levels::of_most(seen.speeds.iter().copied(), STRAY).map(|range| range.high);
+        self.saved.push(Saved { time: seen.time, step: seen.step, fastest, file: name, is_lost: false });
         self.write_collections()?;
         if let Some(pictures) = &mut self.pictures {
             if let Some(meshes) = &moved {
                 pictures.show(meshes);
             }
-            pictures.save(&self.folder.join(format!("pictures/frame_{:06}.png", self.count)), simulation)?;
+            pictures.save(&self.folder.join(picture_name(self.count)), seen)?;
         }
         self.count += 1;
         Ok(())
@@ -290,7 +332,7 @@ impl FrameCost {
                     pictures.show(&meshes);
                 }
                 out.clear();
-                pictures.image(simulation)?.write_png(&mut out)?;
+                pictures.image(Seen::of(simulation))?.write_png(&mut out)?;
                 Ok((started.seconds(), out.len() as f64))
             };
             let (once, _) = drawn()?;
@@ -323,6 +365,10 @@ const OBSTACLE: &str = "obstacle_";
 
 fn frame_name(number: usize) -> String {
     format!("frames/{PARTICLES}{number:06}.vtp")
+}
+
+fn picture_name(number: usize) -> String {
+    format!("pictures/frame_{number:06}.png")
 }
 
 fn obstacle_name(number: usize) -> String {

@@ -99,7 +99,7 @@ pub(super) fn run(shared: &Shared, options: &Run) -> Result<(), Failure> {
         }
         Err(other) => return Err(other),
     };
-    conclude(shared, &folder, &recording, &simulation, stopped)
+    conclude((shared, options), &mut recording, &simulation, stopped)
 }
 
 /// Refuses more obstacles than are reasonable: each has programs and a map of the box of its own.
@@ -132,16 +132,15 @@ fn frames_fit(options: &Run, goal: Goal, experiment: &Experiment) -> Result<(), 
 
 /// Writes the summary and the plots, and says how the run ended.
 fn conclude(
-    shared: &Shared,
-    folder: &Path,
-    recording: &Recording<'_>,
+    (shared, options): (&Shared, &Run),
+    recording: &mut Recording<'_>,
     simulation: &Simulation,
     stopped: Option<Stop>,
 ) -> Result<(), Failure> {
+    let is_whole = stopped.is_none();
     let Recording { frames, probes, watch, experiment, .. } = recording;
-    let summary =
-        Summary::of(watch, experiment, simulation, probes.means()?, (frames.count(), stopped.is_none()));
-    output::write(&folder.join("summary.json"), |out| {
+    let summary = Summary::of(watch, experiment, simulation, probes.means()?, (frames.count(), is_whole));
+    output::write(&frames.folder().join("summary.json"), |out| {
         serde_json::to_writer_pretty(&mut *out, &summary)?;
         writeln!(out)
     })?;
@@ -149,10 +148,11 @@ fn conclude(
     if shared.json {
         output::json(&summary)?;
     }
+    let fitted = if is_whole { frames.fit_colours(options, experiment)? } else { None };
     match stopped {
         None => {
             if !shared.json {
-                summary::print(&summary, frames, probes);
+                summary::print(&summary, (frames, fitted), probes);
             }
             findings::repeat(simulation);
         }

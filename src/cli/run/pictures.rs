@@ -35,27 +35,49 @@ const SMALL: (u32, u32) = (320, 240);
 /// long before.
 const FASTEST: f64 = 0.6;
 
-/// The part of the colours that a fluid should use: they are chosen before anything is known of its motion.
-const PALE: f64 = 0.25;
+/// Colours fit a fluid whose greatest speed lies between these parts of the speed at their end. They are chosen before
+/// anything is known of its motion.
+const FITTING: std::ops::Range<f64> = 0.5..1.2;
 
 /// Options of pictures, besides what the scene states.
 #[derive(Debug, Clone, Copy)]
 pub(in crate::cli) struct Look<'a> {
-    /// The file of the scene, for the title.
-    pub file: &'a Path,
     pub camera: Option<CameraFlag>,
     pub cut: Option<&'a CutFlag>,
     pub hide: &'a [String],
     pub glass: &'a [String],
     /// How the surface of the fluid is drawn, if it is.
     pub surface: Option<Surface>,
+    /// The speed at the end of the colours, m/s, in place of the one that the scene states or lets expect.
+    pub fastest: Option<f64>,
+}
+
+/// The fluid at an instant, as pictures show it.
+pub(in crate::cli) struct Seen {
+    pub places: Vec<DVec3>,
+    /// The speed of each particle, m/s.
+    pub speeds: Vec<f64>,
+    pub time: f64,
+    pub step: Option<u64>,
+}
+
+impl Seen {
+    pub fn of(simulation: &Simulation) -> Self {
+        let particles = simulation.particles();
+        Self {
+            places: particles.position.iter().collect(),
+            speeds: particles.velocity.iter().map(DVec3::length).collect(),
+            time: simulation.time(),
+            step: Some(simulation.steps()),
+        }
+    }
 }
 
 impl<'a> Look<'a> {
     /// What the flags of a run ask for.
     pub fn of(options: &'a Run) -> Self {
-        let Run { file, camera, cut, hide, glass, surface, .. } = options;
-        Self { file, camera: *camera, cut: cut.as_ref(), hide, glass, surface: *surface }
+        let Run { camera, cut, hide, glass, surface, .. } = options;
+        Self { camera: *camera, cut: cut.as_ref(), hide, glass, surface: *surface, fastest: None }
     }
 }
 
@@ -72,8 +94,9 @@ pub(in crate::cli) struct Pictures {
     bodies: Vec<Body>,
     /// How the surface of the fluid is drawn in place of the particles, and the plane that cuts it open.
     surface: Option<(Surface, Option<Cut>)>,
-    /// The speed at the end of the colours, m/s; `None` where they do not show speeds, and where the scene states it.
-    colours_end: Option<f64>,
+    /// The speed at the end of the colours, m/s, if it was only expected: `None` where they do not show speeds, and where
+    /// it is stated.
+    pub expected: Option<f64>,
     pub(in crate::cli) count: usize,
 }
 
@@ -91,10 +114,10 @@ impl Pictures {
         let domain = experiment.domain();
         let camera = camera(look, experiment, Camera::SIZE)?;
         let opened = opened(look, experiment, meshes)?;
-        let title = title(look, experiment, &opened);
+        let title = title(experiment, &opened);
         // a fall is stopped on its way, what drives a fluid otherwise is not
         let share = if experiment.typical_speed() > 0.0 { FASTEST } else { 1.0 };
-        let stated = experiment.scene().picture.fastest;
+        let stated = look.fastest.or(experiment.scene().picture.fastest);
         let fastest = stated.unwrap_or((share * experiment.speed_scale()).max(experiment.start_speed()));
         let body = |(solid, drawn): (&Solid, Drawn)| {
             let near = (!solid.moves() && solid.has_many_leaves()).then(|| solid.surface(domain));
@@ -115,14 +138,16 @@ impl Pictures {
             every: experiment.scene().run.save_every,
             bodies,
             surface: look.surface.map(|surface| (surface, plane(look, experiment, &camera))),
-            colours_end: (look.surface.is_none() && stated.is_none()).then_some(fastest),
+            expected: (look.surface.is_none() && stated.is_none()).then_some(fastest),
             count: 0,
         })
     }
 
-    /// The end of the colours, m/s, if a fluid with this greatest speed has little more than one of them.
-    pub fn pale(&self, max_speed: f64) -> Option<f64> {
-        self.colours_end.filter(|&end| self.count > 0 && max_speed < PALE * end)
+    /// The speed at which the colours should end, m/s, if they do not fit fluid with this greatest speed.
+    pub fn better_end(&self, fastest: f64) -> Option<f64> {
+        let expected = self.expected.filter(|_| self.count > 0 && fastest > 0.0)?;
+        let rounded = format!("{fastest:.1e}").parse().unwrap_or(fastest);
+        (!FITTING.contains(&(fastest / expected))).then_some(rounded)
     }
 
     /// Puts the obstacles where they are now.
@@ -130,27 +155,23 @@ impl Pictures {
         self.moving = moving(&self.domain, &self.bodies, meshes);
     }
 
-    pub fn save(&mut self, path: &Path, simulation: &Simulation) -> Result<(), Failure> {
-        let image = self.image(simulation)?;
+    pub fn save(&mut self, path: &Path, seen: Seen) -> Result<(), Failure> {
+        let image = self.image(seen)?;
         output::write(path, |mut out| image.write_png(&mut out))?;
         self.count += 1;
         Ok(())
     }
 
-    pub fn image(&self, simulation: &Simulation) -> Result<render::Image, Failure> {
-        let particles = simulation.particles();
-        let speeds: Vec<f64> = particles.velocity.iter().map(DVec3::length).collect();
-        let places: Vec<DVec3> = particles.position.iter().collect();
-        let [x, y, z] = columns(&self.lifted(places, simulation.time()));
+    pub fn image(&self, seen: Seen) -> Result<render::Image, Failure> {
+        let water = self.water(&seen.places)?;
+        let [x, y, z] = columns(&self.lifted(seen.places, seen.time));
         let particles = render::ParticlesView {
             positions: rfm::field::Points::new(&x, &y, &z),
-            values: &speeds,
+            values: &seen.speeds,
             radius: self.radius,
         };
-        let moment =
-            render::Caption { time: simulation.time(), every: self.every, step: Some(simulation.steps()) };
+        let moment = render::Caption { time: seen.time, every: self.every, step: seen.step };
         let mut meshes = scenery::views(&self.moving);
-        let water = self.water(simulation)?;
         if let (Some((surface, cut)), Some(water)) = (self.surface, &water) {
             meshes.push(MeshView { cut, ..scenery::surface(water, surface.material()) });
         }
@@ -158,14 +179,14 @@ impl Pictures {
         Ok(self.scene.frame_with(&moving, &moment))
     }
 
-    /// The surface of the fluid as it is now, if it is drawn.
-    fn water(&self, simulation: &Simulation) -> Result<Option<Mesh>, Failure> {
+    /// The surface of a fluid with particles at these places, if it is drawn.
+    fn water(&self, places: &[DVec3]) -> Result<Option<Mesh>, Failure> {
         if self.surface.is_none() {
             return Ok(None);
         }
-        let places = simulation.particles().position.iter().filter(|p| p.is_finite());
+        let places: Vec<DVec3> = places.iter().copied().filter(|p| p.is_finite()).collect();
         let within = Reconstruction { vessel: Some(self.domain), ..Reconstruction::of_radius(self.radius) };
-        let made = within.mesh(&places.collect::<Vec<_>>());
+        let made = within.mesh(&places);
         made.map(Some).map_err(|error| Failure::usage(format!("--surface: {error}")))
     }
 
@@ -284,13 +305,21 @@ fn fluid_samples(experiment: &Experiment) -> Vec<DVec3> {
     points.filter(|p| fluid.sign(*p) > 0.0 && is_free(p)).collect()
 }
 
-/// What is seen: the file, the scene, the method, and what was done to the obstacles.
-fn title(look: Look<'_>, experiment: &Experiment, drawn: &[Drawn]) -> String {
-    let scene = experiment.scene();
-    let file = match look.file.file_name() {
-        Some(name) if look.file.as_os_str() != "-" => Path::new(name).shown(),
+/// The name of the file that a scene stands in, without its folder.
+pub(super) fn file_name(experiment: &Experiment) -> String {
+    let name = experiment.program().sources().first().map_or("-", |source| &source.name);
+    match Path::new(name).file_name() {
+        Some(name) if !["-", "<stdin>"].contains(&&*name.to_string_lossy()) => {
+            name.to_string_lossy().into_owned()
+        }
         Some(_) | None => "standard input".into(),
-    };
+    }
+}
+
+/// What is seen: the file, the scene, the method, and what was done to the obstacles.
+fn title(experiment: &Experiment, drawn: &[Drawn]) -> String {
+    let scene = experiment.scene();
+    let file = Path::new(&file_name(experiment)).shown();
     let mut parts = vec![file, scene.name.clone(), scene.method.name().to_string()];
     let names: Vec<&str> = experiment.bodies().iter().map(|body| body.solid.name()).collect();
     parts.extend(scenery::described(&names, drawn));

@@ -5,6 +5,7 @@ use serde::Serialize;
 use super::findings;
 use super::frames::Frames;
 use super::means::Means;
+use super::pictures;
 use super::probes::Probes;
 use super::watch::Watch;
 use crate::cli::output::{Shown, significant};
@@ -17,7 +18,10 @@ use rfm::sph::{Pass, Simulation};
 #[derive(Debug, Serialize)]
 pub(super) struct Summary {
     schema: u32,
+    /// The name of the file, without its folder.
+    file: String,
     scene: String,
+    method: &'static str,
     /// The names of the obstacles, in the order of the array `body` of their mesh.
     obstacles: Vec<String>,
     steps: u64,
@@ -105,7 +109,9 @@ impl Summary {
         let (audit, compression) = (simulation.audit(), simulation.audit().compression());
         Self {
             schema: 1,
+            file: pictures::file_name(experiment),
             scene: experiment.scene().name.clone(),
+            method: experiment.scene().method.name(),
             obstacles: experiment.bodies().iter().map(|body| body.solid.name().to_string()).collect(),
             steps,
             simulated_seconds: simulation.time(),
@@ -154,8 +160,8 @@ impl Summary {
     }
 }
 
-/// Prints the summary as text.
-pub(super) fn print(summary: &Summary, frames: &Frames, probes: &Probes) {
+/// Prints the summary as text. The colours of pictures may have been `fitted` to end at a speed, m/s.
+pub(super) fn print(summary: &Summary, (frames, fitted): (&Frames, Option<f64>), probes: &Probes) {
     say!(
         "{} particles {:.3e} m apart, {} steps of {:.3e} s = {:.3} s simulated",
         summary.particles,
@@ -233,11 +239,10 @@ pub(super) fn print(summary: &Summary, frames: &Frames, probes: &Probes) {
     };
     let folder = frames.folder().shown();
     say!("written to {folder}: {}{probes}", frames.describe());
-    if let Some(end) = frames.pale(summary.max_speed) {
-        let end = significant(end, 2);
+    if let Some(end) = fitted {
         say!(
-            "the pictures' colours end at {end} m/s, and the fluid stayed far below that: rfm render {folder} fits them, or \
-             `picture {{ fastest: … }}` in the scene states where they end"
+            "the pictures were drawn again with colours up to {end} m/s, which fit the fluid; `picture {{ fastest: … }}` in \
+             the scene states where they end"
         );
     }
 }

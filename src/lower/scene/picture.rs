@@ -24,7 +24,7 @@ declare_keys! {
             "how many times as large as if the whole box were seen, 0.05 … 20";
         CUT = "cut", Words(&["auto", "none"]), Text("auto"),
             "the part of the obstacles that is taken away: `y <= 0.5`, `auto` or `none`";
-        FASTEST = "fastest", Number(Dimension::SPEED, Bound::Positive), Text("from the greatest expected speed"),
+        FASTEST = "fastest", Number(Dimension::SPEED, Bound::Positive), Text("from the speeds that are expected, or at the end of a run from those of its frames if they differ much"),
             "the speed that has the last of the colours, so that pictures of several runs compare";
         HIDE = "hide", Other, Text("none"),
             "obstacles that are not drawn, by their names";
