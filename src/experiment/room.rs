@@ -212,14 +212,16 @@ impl Experiment {
                 let wanted = fluid.particles.unwrap_or_default() as f64;
                 let most = rounded_down(0.98 * wanted * (MAX_SITES / sites).min(1.0));
                 let message = format!(
-                    "{wanted} particles are too many: of the {MAX_SITES:.0e} sites that the lattice around the shape may have, about {most:.1e} lie in it"
+                    "{wanted} particles are too many: of the {MAX_SITES:.0e} sites that the lattice around the shape \
+                     may have, about {most:.1e} lie in it"
                 );
                 let help = format!("write for example `particles: {:.0}`", rounded_down(0.2 * most));
                 no_room(at, message).help(help)
             }
             SeedError::TooLarge { sites } if sites.is_finite() => {
                 let message = format!(
-                    "with {} between particles the lattice around the shape would have {sites:.1e} sites; at most {MAX_SITES:.0e} are possible",
+                    "with {} between particles the lattice around the shape would have {sites:.1e} sites; at most \
+                     {MAX_SITES:.0e} are possible",
                     length(spacing)
                 );
                 let usual = spacing * (sites / USUAL_SITES).cbrt();

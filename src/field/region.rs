@@ -74,8 +74,8 @@ impl Region<'_> {
         parts.into_iter().map(|part| self.volume_of(part, &near, halvings - 1)).sum()
     }
 
-    /// The volume in the eight cells of a box. Ranges would decide most of them, too, but take longer than the values at
-    /// the corners that cells share.
+    /// The volume in the eight cells of a box. Ranges would decide most of them, too, but take longer than the values
+    /// at the corners that cells share.
     fn volume_of_cells(&self, within: Aabb, near: &[usize]) -> f64 {
         let (min, centre, max) = (within.min, within.centre(), within.max);
         let at = |[i, j, k]: [usize; 3]| {

@@ -147,8 +147,8 @@ impl Lowering<'_> {
                 _ => "q",
             };
             let help = format!(
-                "inside shapes only lengths and angles have units; define a name above: write `param {name} = {value} {}`, and \
-                 `{name}` here",
+                "inside shapes only lengths and angles have units; define a name above: write \
+                 `param {name} = {value} {}`, and `{name}` here",
                 unit.text
             );
             return self.fail(Diagnostic::error(Code::UNIT_MISMATCH, unit.span, message).help(help));

@@ -66,7 +66,8 @@ use crate::lettering;
 const INK: &str = "#1c1c1c";
 
 /// What letters have around them, so that they can be read over particles: a border in the colour of the paper.
-const HALO: &str = r##"paint-order="stroke" stroke="#ffffff" stroke-opacity="0.85" stroke-width="5" stroke-linejoin="round""##;
+const HALO: &str =
+    r##"paint-order="stroke" stroke="#fff" stroke-opacity=".85" stroke-width="5" stroke-linejoin="round""##;
 
 /// Draws an SVG body on a page of `size` units, at `scale` pixels per unit.
 fn draw(size: (f64, f64), scale: f64, body: &str) -> Result<Layer, RenderError> {

@@ -133,7 +133,8 @@ impl<'t> Slip<'t> {
         let help = match is_a_mesh(path) {
             true => format!("a mesh from a file is a shape, as in `solid part = mesh(\"{path}\")`"),
             false => format!(
-                "files are imported on a line of their own, as in `import \"{path}\" as parts`; their solids are then `parts.…`"
+                "files are imported on a line of their own, as in `import \"{path}\" as parts`; their solids are \
+                 then `parts.…`"
             ),
         };
         Some(self.unexpected().help(help))

@@ -155,7 +155,8 @@ fn a_plane_within_a_face_shows_what_lies_outside_of_it() {
     assert!(outcome.stderr.is_empty(), "{}", outcome.stderr);
 }
 
-/// Colours are chosen before anything is known of the flow. At the end they fit it, and one scale holds for all pictures.
+/// Colours are chosen before anything is known of the flow. At the end they fit it, and one scale holds for all
+/// pictures.
 #[test]
 fn colours_fit_a_fluid_that_is_slower_than_was_expected() {
     let folder = tempfile::tempdir().unwrap();

@@ -49,7 +49,8 @@ pub(super) struct Frames {
 struct Saved {
     /// Its time, s.
     time: f64,
-    /// The number of steps until then, and the greatest speed of most particles, m/s; `None` if an earlier version saved it.
+    /// The number of steps until then, and the greatest speed of most particles, m/s; `None` if an earlier version
+    /// saved it.
     step: Option<u64>,
     fastest: Option<f64>,
     /// Its file, relative to the folder of the run.
@@ -206,8 +207,8 @@ impl Frames {
         parts.join(", ")
     }
 
-    /// Draws all pictures again if their colours do not fit the speeds of all frames together, so that one scale holds for
-    /// all of them. Returns the new end of the colours, m/s.
+    /// Draws all pictures again if their colours do not fit the speeds of all frames together, so that one scale
+    /// holds for all of them. Returns the new end of the colours, m/s.
     pub fn fit_colours(&mut self, options: &Run, experiment: &Experiment) -> Result<Option<f64>, Failure> {
         let Some(pictures) = &self.pictures else { return Ok(None) };
         let fastest = self

@@ -2,7 +2,8 @@
 //! the fluid.
 //!
 //! Invariant: what is cut or left out is found from the scene at its start and not from particles, so all pictures of a
-//! run agree, resumed or not.
+//! run agree, resumed or not. Their colours are chosen there, too; if they do not fit the fluid, all pictures are drawn
+//! again at the end.
 
 use std::path::Path;
 
@@ -94,8 +95,8 @@ pub(in crate::cli) struct Pictures {
     bodies: Vec<Body>,
     /// How the surface of the fluid is drawn in place of the particles, and the plane that cuts it open.
     surface: Option<(Surface, Option<Cut>)>,
-    /// The speed at the end of the colours, m/s, if it was only expected: `None` where they do not show speeds, and where
-    /// it is stated.
+    /// The speed at the end of the colours, m/s, if it was only expected: `None` where they do not show speeds, and
+    /// where it is stated.
     pub expected: Option<f64>,
     pub(in crate::cli) count: usize,
 }

@@ -241,8 +241,8 @@ pub(super) fn print(summary: &Summary, (frames, fitted): (&Frames, Option<f64>),
     say!("written to {folder}: {}{probes}", frames.describe());
     if let Some(end) = fitted {
         say!(
-            "the pictures were drawn again with colours up to {end} m/s, which fit the fluid; `picture {{ fastest: … }}` in \
-             the scene states where they end"
+            "the pictures were drawn again with colours up to {end} m/s, which fit the fluid; \
+             `picture {{ fastest: … }}` in the scene states where they end"
         );
     }
 }
