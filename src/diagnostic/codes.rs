@@ -309,12 +309,6 @@ that is more than a quarter.";
 FLUID_OUTSIDE_BOX = "W0504":
 "Part of the fluid's shape lies outside the scene's box. The fluid is filled into the part within the box, so there is
 less of it than the shape says. Make the box larger, move the shape, or cut the shape where the box ends.";
-FLUID_LIGHTER = "W0507":
-"A fluid that fills its vessel has no surface to which it could give way. Methods that keep it from being compressed (dfsph)
-pack its particles at the start, and make them lighter: by 5 % at least, because particles that have left their lattice need
-more room, and by more where those at curved walls would be too dense otherwise. Forces and momentum are smaller by as much, and a body that moves in the vessel closes gaps before it meets any resistance:
-a rod that shook in a full vessel met 1 % of that of the water. More particles leave smaller gaps; `method: wcsph` keeps all of
-the mass.";
 THIN_FOR_PARTICLES = "W0508":
 "A gap of an obstacle is thinner than two spacings of the particles, or a wall thinner than half of one. Particles keep
 half a spacing from each face and fill what is left in whole layers: under a head of thirty spacings a gap of 2 spacings

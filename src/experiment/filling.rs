@@ -398,24 +398,6 @@ impl Experiment {
         Ok((particles, carved))
     }
 
-    /// A warning if the fluid has become lighter than it was placed; it is given the present mass, kg, of a
-    /// particle.
-    pub(super) fn lightening(&self, filling: &Filling, mass: f64) -> Option<Diagnostic> {
-        let part = 1.0 - mass / filling.mass;
-        (part > GOOD_ENOUGH).then(|| {
-            let message = format!(
-                "the fluid is {:.1} % lighter than its shape: it fills its vessel, and particles that may not be \
-                 compressed leave gaps at the walls",
-                100.0 * part
-            );
-            Diagnostic::warning(Code::FLUID_LIGHTER, self.scene.fluid.shape_span, message)
-                .help(
-                    "more particles leave less; `method: wcsph` keeps all of the mass, and bodies that move in it meet \
-                     all of its resistance",
-                )
-        })
-    }
-
     /// How many particles were carved off for each reason that there was, as "72 in an obstacle, 3 too close to one".
     pub(super) fn reasons(&self, carved: &Carved) -> String {
         let (within, near) = match (&self.scene.container, self.scene.obstacles.is_empty()) {

@@ -230,9 +230,7 @@ impl Experiment {
         })?;
         self.set_gravity(&mut simulation);
         let outside = self.reach().ok().and_then(|bounds| self.outside(&bounds));
-        let lightening = self.lightening(&filling, simulation.parameters().particle_mass);
-        let warnings =
-            self.diagnostics(outside.into_iter().chain(carving).chain(lightening).chain(dry).collect());
+        let warnings = self.diagnostics(outside.into_iter().chain(carving).chain(dry).collect());
         let carved = carved.inside + carved.too_close + carved.outside_box;
         Ok(Start { simulation, carved, warnings })
     }

@@ -113,9 +113,9 @@ impl Core {
         }
     }
 
-    /// Multiplies the mass of all particles by a factor. The walls follow their spacing.
-    pub fn scale_masses(&mut self, factor: f64) {
-        self.parameters.particle_mass *= factor;
+    /// Lets the particles take this part of their room in sums over neighbours. The walls follow their spacing.
+    pub fn pack(&mut self, packing: f64) {
+        self.parameters.packing = packing;
         self.wall = wall_of(&self.parameters);
     }
 

@@ -59,9 +59,12 @@ pub struct Parameters {
     /// wall falls by μ times the change of its velocity normal to the wall. Zero: no friction.
     pub wall_friction: f64,
     /// Whether the fluid fills all room that the box and the obstacles leave, so that it has no surface.
-    /// `dfsph` then packs the particles at the start and makes them lighter, as far as they would be too
-    /// dense otherwise.
+    /// `dfsph` then packs the particles at the start, and finds their `packing`.
     pub fills_vessel: bool,
+    /// Part of the room of a fluid that fills its vessel which the volumes of its particles take in sums over
+    /// neighbours: particles that have left their lattice leave gaps. One for any other fluid. A simulation
+    /// finds it.
+    pub packing: f64,
     /// Precision of the sums over neighbours. State and motion are always in `f64`. `f32` has seven digits,
     /// relative to a few support radii.
     pub precision: Precision,
@@ -107,6 +110,7 @@ impl Parameters {
             sticks: false,
             wall_friction: 0.0,
             fills_vessel: false,
+            packing: 1.0,
             precision: fluid.precision,
         };
         if !parameters.adaptive {
@@ -132,6 +136,7 @@ impl Parameters {
         let numbers = [
             ("rest_density", self.rest_density, Bound::Positive),
             ("particle_mass", self.particle_mass, Bound::Positive),
+            ("packing", self.packing, Bound::Positive),
             ("support_radius", self.support_radius, Bound::Positive),
             ("viscosity", self.viscosity, Bound::NotNegative),
             ("surface_tension", self.surface_tension, Bound::NotNegative),
@@ -150,7 +155,7 @@ impl Parameters {
         self.method.check()?;
         self.method.numerics().validate(&self.scales())?;
         // Kernels divide by h⁹: with other units than metres that may leave the range of a double.
-        let weight = self.particle_mass * Kernels::new(self.support_radius).poly6(0.0);
+        let weight = self.mass_in_sums() * Kernels::new(self.support_radius).poly6(0.0);
         check(
             "support_radius",
             self.support_radius,
@@ -159,11 +164,21 @@ impl Parameters {
         )
     }
 
+    /// The mass, kg, with which a particle counts in sums over neighbours.
+    pub(crate) fn mass_in_sums(&self) -> f64 {
+        self.packing * self.particle_mass
+    }
+
+    /// The volume, m³, with which a particle at rest counts in sums over neighbours.
+    pub(crate) fn volume_in_sums(&self) -> f64 {
+        self.mass_in_sums() / self.rest_density
+    }
+
     /// What the method derives numbers from.
     pub(crate) fn scales(&self) -> Scales {
         Scales {
             rest_density: self.rest_density,
-            particle_mass: self.particle_mass,
+            particle_mass: self.mass_in_sums(),
             support_radius: self.support_radius,
             viscosity: self.viscosity,
             surface_tension: self.surface_tension,

@@ -15,7 +15,7 @@ pub enum Slip {
 pub struct Scales {
     /// Rest density ρ₀, kg/m³.
     pub rest_density: f64,
-    /// Mass of one particle, kg.
+    /// Mass with which one particle counts in sums over neighbours, kg.
     pub particle_mass: f64,
     /// Support radius h, m.
     pub support_radius: f64,

@@ -46,6 +46,9 @@ const AUDIT: &str = "audit";
 /// has the mass of its shape.
 const MASS: &str = "particle mass";
 
+/// Name of the packing in a checkpoint.
+const PACKING: &str = "packing";
+
 /// Name of whether the fluid fills its vessel, 1 or 0, in a checkpoint.
 const FILLS_VESSEL: &str = "fills its vessel";
 
@@ -112,6 +115,9 @@ impl Simulation {
         if let Ok([mass]) = checkpoint.get(MASS) {
             parameters.particle_mass = *mass;
         }
+        if let Ok([packing]) = checkpoint.get(PACKING) {
+            parameters.packing = *packing;
+        }
         if let Ok([fills_vessel]) = checkpoint.get(FILLS_VESSEL) {
             parameters.fills_vessel = *fills_vessel != 0.0;
         }
@@ -133,6 +139,7 @@ impl Simulation {
         self.scheme.save(&mut checkpoint);
         checkpoint.set(AUDIT, self.audit.memory());
         checkpoint.set(MASS, vec![self.core.parameters.particle_mass]);
+        checkpoint.set(PACKING, vec![self.core.parameters.packing]);
         checkpoint.set(FILLS_VESSEL, vec![f64::from(u8::from(self.core.parameters.fills_vessel))]);
         checkpoint
     }

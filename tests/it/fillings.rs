@@ -2,7 +2,9 @@
 
 use std::ops::ControlFlow;
 
+use glam::DVec3;
 use rfm::experiment::Deviations;
+use rfm::sph::Probe;
 use rfm::{Engine, Experiment, Program};
 
 /// The flow of `couette`, five spacings across, for a method without compression.
@@ -201,22 +203,29 @@ scene still {
     assert!((mean / 0.25 - 1.0).abs() < 0.01, "{mean}");
 }
 
-/// A fluid that fills its vessel is packed and becomes a little lighter, and says so. Particles that are left
-/// out at the walls instead leave gaps, and the flow deviates by 63 %.
+/// A fluid that fills its vessel is packed and keeps its mass. Particles that are left out at the walls instead leave
+/// gaps, and the flow deviates by 63 %.
 #[test]
 fn a_fluid_that_fills_its_vessel_is_packed() {
     let program = Program::from_source("enclosed.rfm", ENCLOSED).unwrap_or_else(|e| panic!("{e}"));
     let experiment = Experiment::new(&program, "enclosed", Engine::Auto).unwrap_or_else(|e| panic!("{e}"));
     let start = experiment.start().unwrap_or_else(|e| panic!("{e}"));
-    let said: Vec<_> = start.warnings.list.iter().map(|warning| warning.code.0).collect();
-    assert_eq!(said, ["W0507"]);
+    assert!(start.warnings.list.is_empty(), "{:?}", start.warnings.list);
     // the lattice has this number of sites more than the fluid has cells
     assert!(start.carved <= 5, "{}", start.carved);
     let mut simulation = start.simulation;
     let mass = simulation.parameters().particle_mass * simulation.particles().len() as f64;
     let whole = 1000.0 * std::f64::consts::PI * 0.75 * 0.4;
-    println!("{} particles, {:.1} % of the mass", simulation.particles().len(), 100.0 * mass / whole);
-    assert!((0.93..1.0).contains(&(mass / whole)), "{mass} of {whole}");
+    let packing = simulation.parameters().packing;
+    println!(
+        "{} particles, {:.2} % of the mass, {packing:.3} of the room",
+        simulation.particles().len(),
+        100.0 * mass / whole
+    );
+    assert!(
+        (mass / whole - 1.0).abs() < 2e-3 && (0.9..0.98).contains(&packing),
+        "{mass} of {whole}, {packing}"
+    );
     let mut deviations = Deviations::default();
     for frame in 1..=20 {
         let reached = simulation.advance(f64::from(frame) * 0.1, |_| ControlFlow::Continue(()));
@@ -225,12 +234,93 @@ fn a_fluid_that_fills_its_vessel_is_packed() {
     }
     let velocity = deviations.total().velocity;
     println!("enclosed: {velocity:?}");
-    assert!(velocity.is_some_and(|velocity| velocity < 0.15), "{velocity:?}");
+    assert!(velocity.is_some_and(|velocity| velocity < 0.13), "{velocity:?}");
 }
 
-/// The particles of a full vessel become lighter at the start, and a run that goes on from a checkpoint has
-/// to know all that follows from that. (What kernels miss before a surface was that of the stated mass in the
-/// one, and of the lighter one in the other.)
+/// A rod that shakes in a full vessel carries the mass of water that potential flow gives, πρa²(b² + a²)/(b² − a²) for
+/// each metre. (Displaced particles used to close gaps first, and it felt 1 % of that.)
+#[test]
+fn a_body_in_a_full_vessel_meets_its_water() {
+    let text = "rfm 1
+solid rod = cylinder(0.1, 2).move([0.01*(1 - cos(10*t)), 0, -1])
+solid pot = cylinder(0.3, 2).move([0, 0, -1])
+scene shake {
+  box { min: [-0.32, -0.32, 0], max: [0.32, 0.32, 0.06] }
+  container { solid: pot }
+  obstacle { solid: rod }
+  fluid water { shape: 0.1^2 <= x^2 + y^2 <= 0.3^2, density: 1000, particles: 3000 }
+  gravity: [0, 0, 0]
+  method: dfsph
+  probe f { force: rod }
+  run { until: 1 s }
+}";
+    let program = Program::from_source("shake.rfm", text).unwrap_or_else(|e| panic!("{e}"));
+    let experiment = Experiment::new(&program, "shake", Engine::Auto).unwrap_or_else(|e| panic!("{e}"));
+    let mut simulation = experiment.start().unwrap_or_else(|e| panic!("{e}")).simulation;
+    // the container comes first
+    let mut gauge = simulation.gauge(Probe::Force { obstacle: 1, about: DVec3::ZERO }).unwrap();
+    let (mut felt, mut all, mut time) = (0.0, 0.0, 0.0);
+    let period = std::f64::consts::TAU / 10.0;
+    while time < period {
+        simulation.step_at_most(period - time).unwrap_or_else(|e| panic!("{e}"));
+        let dt = simulation.time() - time;
+        let acceleration = (10.0 * (time + 0.5 * dt)).cos();
+        felt -= dt * acceleration * simulation.sample(&mut gauge)[0];
+        all += dt * acceleration * acceleration;
+        time = simulation.time();
+    }
+    let (found, truth) = (felt / all, 1000.0 * std::f64::consts::PI * 0.01 * 0.1 / 0.08 * 0.06);
+    println!("{found:.3} kg for {truth:.3}, {} particles", simulation.particles().len());
+    // particles keep half a spacing, a sixth of the rod's radius, from it; a twentieth more or less of that is 2 %
+    assert!((found / truth - 1.0).abs() < 0.1, "{found} for {truth}");
+}
+
+/// In a full vessel differences of pressure are those of the whole weight, and the vessel bears all of it.
+#[test]
+fn a_full_vessel_weighs_what_its_shape_weighs() {
+    let text = "rfm 1
+solid pot = cylinder(0.3, 2).move([0, 0, -1])
+scene full {
+  box { min: [-0.35, -0.35, 0], max: [0.35, 0.35, 0.6] }
+  container { solid: pot }
+  fluid water { shape: x^2 + y^2 <= 0.3^2, density: 1000, particles: 2500 }
+  gravity: [4, 0, -9.81]
+  method: dfsph
+  probe f { force: pot }
+  run { until: 1 s }
+}";
+    let program = Program::from_source("full.rfm", text).unwrap_or_else(|e| panic!("{e}"));
+    let experiment = Experiment::new(&program, "full", Engine::Auto).unwrap_or_else(|e| panic!("{e}"));
+    let mut simulation = experiment.start().unwrap_or_else(|e| panic!("{e}")).simulation;
+    let mut gauges: Vec<_> = [
+        Probe::Force { obstacle: 0, about: DVec3::ZERO },
+        Probe::Pressure { at: DVec3::new(0.0, 0.0, 0.1) },
+        Probe::Pressure { at: DVec3::new(0.0, 0.0, 0.4) },
+    ]
+    .map(|probe| simulation.gauge(probe).unwrap())
+    .into();
+    let mut sums = [0.0; 3];
+    while simulation.time() < 1.0 {
+        let before = simulation.time();
+        simulation.step().unwrap_or_else(|e| panic!("{e}"));
+        if before > 0.5 {
+            let dt = simulation.time() - before;
+            for (sum, gauge) in sums.iter_mut().zip(&mut gauges) {
+                *sum += dt * simulation.sample(gauge)[0];
+            }
+        }
+    }
+    let [force, low, high] = sums.map(|sum| sum / 0.5);
+    let weight = 4.0 * 1000.0 * std::f64::consts::PI * 0.09 * 0.6;
+    println!("{force:.1} N for {weight:.1} N, {:.0} Pa for {:.0} Pa", low - high, 0.3 * 9810.0);
+    // a mean over half a second of a fluid that has not quite come to rest
+    assert!((force / weight - 1.0).abs() < 0.01, "{force} for {weight}");
+    assert!(((low - high) / (0.3 * 9810.0) - 1.0).abs() < 0.02, "{low} {high}");
+}
+
+/// The particles of a full vessel are packed at the start, and a run that goes on from a checkpoint has to know all that
+/// follows from that. (What kernels miss before a surface was that of a lattice in the one, and of the packing in the
+/// other.)
 #[test]
 fn a_full_vessel_goes_on_with_the_same_bits() {
     let text = "rfm 1

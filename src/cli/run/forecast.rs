@@ -184,7 +184,7 @@ fn coarser(
         started(most).or_else(|_: Error| started(4.0 * most)).or_else(|_: Error| started(16.0 * most));
     let (smaller, mut start, seconds) = found.map_err(refused)?;
     // warnings that count particles, or depend on their size, would mislead
-    let misleads = [Code::FLUID_IN_OBSTACLE, Code::FLUID_LIGHTER, Code::DRY_WALL];
+    let misleads = [Code::FLUID_IN_OBSTACLE, Code::DRY_WALL];
     start.warnings.list.retain(|warning| !misleads.contains(&warning.code));
     input::show(&start.warnings);
     Ok((smaller, start.simulation, seconds))

@@ -19,7 +19,7 @@ pub(super) struct Crowding {
 impl Crowding {
     pub fn of(parameters: &Parameters) -> Self {
         let kernel = Wendland::new(parameters.support_radius);
-        let volume = parameters.particle_mass / parameters.rest_density;
+        let volume = parameters.volume_in_sums();
         Self { kernel, steepness: volume * kernel.steepness }
     }
 

@@ -79,7 +79,7 @@ impl SpinViscosity {
         }
         let parameters = &core.parameters;
         let kernel = Wendland::new(parameters.support_radius);
-        let steepness = parameters.particle_mass / parameters.rest_density * kernel.steepness;
+        let steepness = parameters.volume_in_sums() * kernel.steepness;
         let n = core.particles.len();
         self.spin.resize(n);
         self.rubbing.resize(n);

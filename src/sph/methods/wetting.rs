@@ -74,7 +74,7 @@ impl Wetting {
         }
         let kernel = Wendland::new(h);
         let parameters = &core.parameters;
-        let volume = parameters.particle_mass / parameters.rest_density;
+        let volume = parameters.volume_in_sums();
         let whole = Wendland::lattice_sum(h / parameters.spacing());
         let pass = Fullness { kernel, weight: kernel.weight * volume / whole, walls: &self.walls };
         let mut wet = std::mem::take(&mut core.wet);

@@ -266,7 +266,7 @@ impl Wetting<'_> {
         let (density, pressure) = (particles.density[i], particles.pressure[i]);
         let drag = contacts.as_ref().map_or(DVec3::ZERO, |contacts| contacts.drag(i));
         let by_pressure = acceleration.get(i) - self.core.gravity(i) - drag;
-        let volume = parameters.particle_mass / density;
+        let volume = parameters.mass_in_sums() / density;
         NearParticle { i, at: particles.position.get(i), volume, pressure, density, by_pressure }
     }
 

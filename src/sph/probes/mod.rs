@@ -217,7 +217,7 @@ impl Weight {
 
 /// The filled part of the kernel at a place, relative to its part outside walls: one deep in the fluid.
 fn filling(core: &Core, weight: &Weight, at: DVec3, particles: impl Iterator<Item = DVec3>) -> f64 {
-    let volume = core.parameters.particle_mass / core.parameters.rest_density;
+    let volume = core.parameters.volume_in_sums();
     let filled: f64 = particles.map(|p| volume * weight.at(p.distance_squared(at))).sum();
     let covered = core.boundary.coverage::<(), ()>(core.wall(), at).map_or(0.0, |walls| walls.part);
     filled / (1.0 - covered.min(MOST_COVERED))

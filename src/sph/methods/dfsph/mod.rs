@@ -2,6 +2,7 @@
 
 mod ahead;
 mod arrest;
+mod full;
 mod passes;
 mod rigid;
 mod scheme;

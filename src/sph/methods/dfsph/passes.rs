@@ -31,7 +31,7 @@ pub(super) struct Constants {
 
 impl Constants {
     pub fn of(parameters: &Parameters) -> Self {
-        let (h, m) = (parameters.support_radius, parameters.particle_mass);
+        let (h, m) = (parameters.support_radius, parameters.mass_in_sums());
         let kernel = Wendland::new(h);
         Self {
             kernel,

@@ -3,7 +3,7 @@
 //!
 //! ```text
 //! v ← v + dt·(½·g + viscosity)
-//! v ← v + dt·a(s)          s ≥ 0 so that dρ/dt ≤ −D/τ, or ≤ (ρ₀ − ρ)/τ where ρ < ρ₀
+//! v ← v + dt·a(s)          s ≥ 0 so that dρ/dt ≤ −D/τ, or ≤ (ρ₀ − ρ)/τ where ρ < ρ₀; see `full` if there is no surface
 //! D ← D + dt·(the part of dρ/dt that the solver left)
 //! v ← v + ½·dt·(g + a(s̄))
 //! x ← x + dt·v + b(s′)     s′ ≥ 0 so that ρ ≤ ρ₀ at the new place
@@ -81,7 +81,7 @@ use super::passes::{Constants, Continuation, Densities, Drag};
 use super::rigid::Rigid;
 use super::solver::{Begin, Errors, Goal, RateOf, Solver};
 use super::walls::Walls;
-use super::{ADVECTION, Dfsph, NOMINAL_SOUND};
+use super::{ADVECTION, Dfsph, NOMINAL_SOUND, full};
 use crate::sph::{
     checkpoint::{Checkpoint, CheckpointError},
     core::Core,
@@ -419,17 +419,17 @@ impl DivergenceFree {
         let relaxation = relaxation_time(&core.parameters, core.speed, dt);
         // the compression without pressure; each iteration finds how much of it s takes away
         self.forces.find_rate_of(core, &self.walls, &core.particles.velocity, RateOf::Velocity(&self.whole));
-        let wanted = |rho: f64, debt: f64| ((rho - rest).min(0.0) + debt) / relaxation;
-        self.free.clear();
-        let densities = &self.loaded;
-        self.free.extend(
-            self.forces
-                .rate
-                .iter()
-                .zip(densities)
-                .zip(&self.debt)
-                .map(|((rate, rho), debt)| rate + wanted(*rho, *debt)),
-        );
+        let found = (&self.forces.rate[..], &self.loaded[..], &self.debt[..]);
+        if core.parameters.fills_vessel {
+            full::find_unwanted(&mut self.free, found, relaxation);
+        } else {
+            let (rates, densities, debts) = found;
+            let unwanted = |((rate, rho), debt): ((&f64, &f64), &f64)| {
+                rate + ((rho - rest).min(0.0) + debt) / relaxation
+            };
+            self.free.clear();
+            self.free.extend(rates.iter().zip(densities).zip(debts).map(unwanted));
+        }
         // The error that a step leaves becomes a debt, which the next steps pay back. Even if every step
         // leaves one, the debt is at most eight tolerances. Only positions guarantee the density.
         let mut goal = Goal {

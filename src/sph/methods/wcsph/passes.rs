@@ -117,7 +117,7 @@ impl<'a> Rates<'a> {
             pressure,
             excess,
             kernel,
-            steepness: parameters.particle_mass / parameters.rest_density * kernel.steepness,
+            steepness: parameters.volume_in_sums() * kernel.steepness,
             diffusion: 2.0 * numbers.density_diffusion * smoothing * numbers.sound_speed,
             laminar: parameters.viscosity / parameters.rest_density,
             artificial: parameters.rest_density
@@ -251,7 +251,7 @@ impl<const LAMINAR: bool, const ARTIFICIAL: bool, const EVEN: bool> Pairs<'_, LA
         } else {
             rates.core.coverage::<()>(i)
         };
-        let by_weight = parameters.particle_mass * rates.kernel.weight * weights;
+        let by_weight = parameters.mass_in_sums() * rates.kernel.weight * weights;
         let mut filled = by_weight / (rest * rates.lattice);
         let mut places = by_weight;
         // how fast the wall approaches, in units of the kernel that it takes

@@ -47,7 +47,7 @@ impl DivergenceFree {
     }
 
     /// Finds the pressures around the particles, and averages the reported ones over at most the time in which a
-    /// particle moves by a spacing.
+    /// particle moves by a spacing. Packed particles are heavier than they count in the sums, and so is their weight.
     pub(super) fn report_pressure(&mut self, core: &mut Core, dt: f64, relaxation: f64) {
         let Constants { kernel, rest_density, .. } = Constants::of(&core.parameters);
         self.field.resize(self.free.len(), 0.0);
@@ -58,12 +58,12 @@ impl DivergenceFree {
         let pass = Field { kernel, rest_density, push };
         core.sum(&pass, [&self.free], [&mut self.field]);
         let share = mean_share(core, dt, relaxation);
-        let spacing = core.parameters.spacing();
+        let (spacing, packing) = (core.parameters.spacing(), core.parameters.packing);
         let Particles { position, velocity, pressure, .. } = &mut core.particles;
         for (i, (mean, now)) in pressure.iter_mut().zip(&self.field).enumerate() {
             let speed = (velocity.get(i) - self.whole.at(position.get(i))).length();
             // the pressure that a particle bore a spacing ago belongs to another place
-            *mean += share.max((dt * speed / spacing).min(1.0)) * (now - *mean);
+            *mean += share.max((dt * speed / spacing).min(1.0)) * (now / packing - *mean);
         }
     }
 }
