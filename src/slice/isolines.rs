@@ -8,9 +8,10 @@
 //! Invariant: a loop has ω ≥ level on its left. The order of loops and points depends on the samples alone.
 
 use glam::DVec2;
+use rayon::prelude::*;
 
 use super::Samples;
-use crate::field::Field;
+use crate::field::{Field, Points};
 
 /// A connected piece of a level set.
 #[derive(Debug, Clone, PartialEq)]
@@ -74,29 +75,40 @@ struct Tracer<'a> {
 
 impl Tracer<'_> {
     fn outlines(&self) -> Vec<Outline> {
-        let next = self.segments();
-        let mut visited = vec![false; next.len()];
-        let mut outlines = Vec::new();
-        for start in 0..next.len() {
-            if next[start] == NONE || visited[start] {
-                continue;
-            }
+        let loops = self.loops();
+        let crossings = self.crossings(loops.iter().flatten().copied());
+        let mut crossings = crossings.into_iter();
+        let outline = |edges: Vec<usize>| {
             let mut outline = Outline { points: Vec::new(), rim: Vec::new() };
-            let mut edge = start;
-            while !visited[edge] {
-                visited[edge] = true;
-                let (point, rim) = self.crossing(edge);
+            for (point, rim) in crossings.by_ref().take(edges.len()) {
                 if outline.points.last() != Some(&point) || outline.rim.last() != Some(&rim) {
                     outline.points.push(point);
                     outline.rim.push(rim);
                 }
+            }
+            (outline.points.len() > 2).then_some(outline)
+        };
+        loops.into_iter().filter_map(outline).collect()
+    }
+
+    /// The grid edges that each closed line crosses, in order.
+    fn loops(&self) -> Vec<Vec<usize>> {
+        let next = self.segments();
+        let mut visited = vec![false; next.len()];
+        let mut loops = Vec::new();
+        for start in 0..next.len() {
+            if next[start] == NONE || visited[start] {
+                continue;
+            }
+            let (mut edges, mut edge) = (Vec::new(), start);
+            while !visited[edge] {
+                visited[edge] = true;
+                edges.push(edge);
                 edge = next[edge] as usize;
             }
-            if outline.points.len() > 2 {
-                outlines.push(outline);
-            }
+            loops.push(edges);
         }
-        outlines
+        loops
     }
 
     /// For each grid edge that a line crosses, the edge where the line goes next.
@@ -168,59 +180,124 @@ impl Tracer<'_> {
         self.samples.position(clamp(column, self.samples.columns), clamp(row, self.samples.rows))
     }
 
-    /// The point of a crossed edge on the level, and whether it is on the rim instead.
-    fn crossing(&self, edge: usize) -> (DVec2, bool) {
+    /// For each crossed edge its point on the level, and whether it is on the rim instead.
+    ///
+    /// All roots are sought together, because a column of points costs a small part of as many single ones.
+    fn crossings(&self, edges: impl Iterator<Item = usize>) -> Vec<(DVec2, bool)> {
+        let mut waiting = Vec::new();
+        let mut found: Vec<(DVec2, bool)> = Vec::new();
+        for edge in edges {
+            let [inner, outer] = self.ends(edge);
+            found.push((inner.0, outer.1.is_nan()));
+            if !outer.1.is_nan() {
+                let [lo, hi] = [inner, outer].map(|(_, omega)| omega - self.level);
+                waiting.push((found.len() - 1, [inner.0, outer.0], Bracket::new(lo, hi)));
+            }
+        }
+        waiting.par_chunks_mut(SOUGHT_TOGETHER).for_each(|sought| self.find_roots(sought));
+        for (k, [inner, outer], bracket) in waiting {
+            found[k].0 = inner.lerp(outer, bracket.lo.0);
+        }
+        found
+    }
+
+    /// The ends of a crossed edge with their ω: the one inside the level first.
+    fn ends(&self, edge: usize) -> [(DVec2, f64); 2] {
         let (node, vertical) = (edge / 2, edge % 2 == 1);
         let from = (node % self.width(), node / self.width());
         let to = if vertical { (from.0, from.1 + 1) } else { (from.0 + 1, from.1) };
         let [a, b] = [from, to].map(|(i, j)| (self.position(i, j), self.value(i, j)));
-        let (inner, outer) = if self.inside(a.1) { (a, b) } else { (b, a) };
-        if outer.1.is_nan() {
-            return (inner.0, true);
+        if self.inside(a.1) { [a, b] } else { [b, a] }
+    }
+
+    /// Narrows brackets on their edges until each holds its root.
+    fn find_roots(&self, sought: &mut [(usize, [DVec2; 2], Bracket)]) {
+        let mut open: Vec<(&[DVec2; 2], &mut Bracket, f64)> =
+            sought.iter_mut().map(|(_, ends, bracket)| (&*ends, bracket, 0.0)).collect();
+        let [mut x, mut y, mut z, mut omega] = [const { Vec::new() }; 4];
+        loop {
+            open.retain_mut(|(_, bracket, t)| bracket.next().map(|next| *t = next).is_some());
+            if open.is_empty() {
+                return;
+            }
+            [&mut x, &mut y, &mut z].into_iter().for_each(Vec::clear);
+            for ([inner, outer], _, t) in &open {
+                let p = self.samples.plane.point(inner.lerp(*outer, *t));
+                x.push(p.x);
+                y.push(p.y);
+                z.push(p.z);
+            }
+            omega.clear();
+            omega.resize(open.len(), 0.0);
+            self.field.omega_many(Points::new(&x, &y, &z), &mut omega);
+            for ((_, bracket, t), omega) in open.iter_mut().zip(&omega) {
+                bracket.take(*t, omega - self.level);
+            }
         }
-        let along = |t: f64| inner.0.lerp(outer.0, t);
-        let excess = |t: f64| self.field.omega(self.samples.plane.point(along(t))) - self.level;
-        (along(root(excess, inner.1 - self.level, outer.1 - self.level)), false)
     }
 }
 
-/// The final bracket of a root, relative to the edge of a cell.
-const ROOT_TOLERANCE: f64 = 1e-13;
+/// The number of roots that one task seeks.
+const SOUGHT_TOGETHER: usize = 2048;
 
-/// A root of f in [0, 1] with f(0) ≥ 0 > f(1), by Illinois steps and bisections in turn, so that kinks and
-/// jumps cannot stall it. Steps keep off the ends by the tolerance, so that the far end is drawn in when the
-/// near one has reached the root. The search stops where f has no value.
-fn root(f: impl Fn(f64) -> f64, f0: f64, f1: f64) -> f64 {
-    let (mut lo, mut hi) = ((0.0, f0), (1.0, f1));
-    let mut kept = 0;
-    for step in 1..=110 {
-        if lo.1 == 0.0 || hi.0 - lo.0 <= 2.0 * ROOT_TOLERANCE {
-            break;
+/// The final bracket of a root, relative to the edge of a cell: far below the width of a line.
+const ROOT_TOLERANCE: f64 = 1e-10;
+
+/// Steps after which a root has to do.
+const MOST_STEPS: u32 = 90;
+
+/// The part of [0, 1] that holds a root of f with f(0) ≥ 0 > f(1), narrowed by Illinois steps and bisections in turn, so
+/// that kinks and jumps cannot stall it. Steps keep off the ends by the tolerance, so that the far end is drawn in when
+/// the near one has reached the root.
+#[derive(Debug, Clone, Copy)]
+struct Bracket {
+    /// The place and the value of the last point that is not below zero, and of the first that is.
+    lo: (f64, f64),
+    hi: (f64, f64),
+    /// Which end the last step moved: 1 the lower, -1 the upper, 0 before the first.
+    moved: i8,
+    steps: u32,
+}
+
+impl Bracket {
+    fn new(f0: f64, f1: f64) -> Self {
+        Self { lo: (0.0, f0), hi: (1.0, f1), moved: 0, steps: 0 }
+    }
+
+    /// Where f is to be taken next; `None` if the root is found.
+    fn next(&mut self) -> Option<f64> {
+        let Self { lo, hi, steps, .. } = self;
+        if lo.1 == 0.0 || hi.0 - lo.0 <= 2.0 * ROOT_TOLERANCE || *steps >= MOST_STEPS {
+            return None;
         }
+        *steps += 1;
         let secant = lo.0 + (hi.0 - lo.0) * (lo.1 / (lo.1 - hi.1));
-        let t = if step % 2 == 0 || !secant.is_finite() {
+        Some(if *steps % 2 == 0 || !secant.is_finite() {
             0.5 * (lo.0 + hi.0)
         } else {
             secant.clamp(lo.0 + ROOT_TOLERANCE, hi.0 - ROOT_TOLERANCE)
-        };
-        let value = f(t);
+        })
+    }
+
+    /// Takes the value at a place. The search ends where f has no value.
+    fn take(&mut self, t: f64, value: f64) {
+        let Self { lo, hi, moved, steps } = self;
         if value >= 0.0 {
-            lo = (t, value);
-            if kept == 1 {
+            *lo = (t, value);
+            if *moved == 1 {
                 hi.1 *= 0.5;
             }
-            kept = 1;
+            *moved = 1;
         } else if value < 0.0 {
-            hi = (t, value);
-            if kept == -1 {
+            *hi = (t, value);
+            if *moved == -1 {
                 lo.1 *= 0.5;
             }
-            kept = -1;
+            *moved = -1;
         } else {
-            break;
+            *steps = MOST_STEPS;
         }
     }
-    lo.0
 }
 
 #[cfg(test)]
@@ -293,7 +370,14 @@ mod tests {
 
     #[test]
     fn the_root_of_a_kink_and_of_a_jump_is_found() {
-        assert!((root(|t| if t < 0.3 { 1e-9 } else { -1e9 }, 1e-9, -1e9) - 0.3).abs() < 1e-12);
-        assert!((root(|t| (0.7 - t).min(1e3 * (0.7 - t)), 0.7, -300.0) - 0.7).abs() < 1e-12);
+        let root = |f: fn(f64) -> f64, f0, f1| {
+            let mut bracket = Bracket::new(f0, f1);
+            while let Some(t) = bracket.next() {
+                bracket.take(t, f(t));
+            }
+            bracket.lo.0
+        };
+        assert!((root(|t| if t < 0.3 { 1e-9 } else { -1e9 }, 1e-9, -1e9) - 0.3).abs() < 3e-10);
+        assert!((root(|t| (0.7 - t).min(1e3 * (0.7 - t)), 0.7, -300.0) - 0.7).abs() < 3e-10);
     }
 }
