@@ -126,6 +126,8 @@ fn by_meshes(
         Err(VolumeError::TooThin) => {
             let why = format!("it is empty, or too thin for {VOLUME_CELLS} cells along its longest side");
             facts.no_volume = Some(why + &uneven_sides(bounds).unwrap_or_default());
+            // nothing shows how far it reaches
+            facts.are_loose = true;
             return Ok(ByMeshes::ShowNothing);
         }
         Err(error @ VolumeError::TooFewCells(_)) => return Err(Failure::usage(error)),

@@ -34,7 +34,10 @@ fn may_be_empty(named: &NamedSolid) -> Diagnostic {
         named.name
     );
     Diagnostic::warning(Code::EMPTY_SOLID, named.span, message)
-        .help("look for a shape that is joined by `and` to its own outside, for a thickness of zero, or for a missing unit")
+        .help(
+            "look for a shape that is joined by `and` to its own outside, for a thickness of zero, or for a missing unit; \
+             if its bounds are far too large, give it a box: `shape and box(…)`",
+        )
 }
 
 /// Warnings about a solid that is empty, unbounded or thin.
