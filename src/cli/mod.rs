@@ -148,7 +148,7 @@ fn hint(error: &clap::Error) -> Option<String> {
     }
     let key = argument.strip_prefix("--")?.replace('-', "_");
     if let Some(file) = file_with_param(&key) {
-        let value = std::env::args().skip_while(|given| given != argument).nth(1);
+        let value = arguments().skip_while(|given| given != argument).nth(1);
         let value = value.filter(|value| parse_quantity(value).is_ok()).unwrap_or_else(|| "…".into());
         return Some(format!("`{key}` is a param of `{}`: write `-D {key}={value}`", printable(&file)));
     }
@@ -160,9 +160,14 @@ fn hint(error: &clap::Error) -> Option<String> {
     })
 }
 
+/// The arguments of this program, as far as they are text.
+fn arguments() -> impl Iterator<Item = String> {
+    std::env::args_os().map(|argument| argument.to_string_lossy().into_owned())
+}
+
 /// The argument in front of another one.
 fn argument_before(argument: &str) -> Option<String> {
-    let all: Vec<String> = std::env::args().collect();
+    let all: Vec<String> = arguments().collect();
     let at = all.iter().position(|given| given == argument)?;
     all.get(at.checked_sub(1)?).cloned()
 }
@@ -172,7 +177,7 @@ fn file_with_param(name: &str) -> Option<String> {
     let declares = |line: &str| {
         line.strip_prefix("param ").is_some_and(|rest| rest.split(['=', ' ']).next() == Some(name))
     };
-    let mut files = std::env::args().filter(|argument| argument.ends_with(".rfm"));
+    let mut files = arguments().filter(|argument| argument.ends_with(".rfm"));
     files.find(|file| std::fs::read_to_string(file).is_ok_and(|text| text.lines().any(declares)))
 }
 

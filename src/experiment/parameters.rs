@@ -207,8 +207,9 @@ pub(super) fn longer_than_the_run(scene: &Scene, parameters: &Parameters) -> Opt
     let stable = parameters.stable_dt(speed);
     let message = format!("a step of {dt} s is longer than the run of {until} s");
     let help = format!(
-        "leave `dt` out, or write `dt: {}`: {} are stable up to {speed:.1} m/s, the speed of a fall through the box",
-        time_as_written((0.9 * stable).min(until)),
+        "leave `dt` out, or write `dt: {}`: {} are stable up to the expected speed of {speed:.1} m/s",
+        // rounding up must not make it longer than the run
+        time_as_written(0.9 * stable.min(until)),
         time_as_written(stable)
     );
     let at = scene.run.dt_span.unwrap_or(scene.span);

@@ -215,8 +215,12 @@ impl Experiment {
                     "{wanted} particles are too many: of the {MAX_SITES:.0e} sites that the lattice around the shape \
                      may have, about {most:.1e} lie in it"
                 );
-                let help = format!("write for example `particles: {:.0}`", rounded_down(0.2 * most));
-                no_room(at, message).help(help)
+                let fewer = rounded_down(0.2 * most);
+                no_room(at, message).help(if fewer >= 1.0 {
+                    format!("write for example `particles: {fewer:.0}`")
+                } else {
+                    "the shape is too thin for its bounds: fill a part of it".into()
+                })
             }
             SeedError::TooLarge { sites } if sites.is_finite() => {
                 let message = format!(

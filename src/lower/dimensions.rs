@@ -173,7 +173,7 @@ impl Lowering<'_> {
                 .at("taken as a number of radians")
                 .label(length.span, "a length")
                 .help(format!(
-                    "the angle of a place about z is `atan2(y, x)`: write `atan2(y, x) <= {written}`"
+                    "the angle of a place about z is `atan2(y, x)`: compare that with `{written}`"
                 )),
         );
     }

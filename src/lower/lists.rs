@@ -14,6 +14,9 @@ const MOST_NUMBERS: usize = 100_000;
 /// How deep lists may be nested.
 const DEEPEST_LIST: usize = 32;
 
+/// The farthest end of a range: up to 2⁵³ every whole number is a number.
+const MOST_COUNTED: f64 = 9_007_199_254_740_992.0;
+
 impl Lowering<'_> {
     /// Three numbers are a vector; anything else in square brackets is a list.
     pub fn vector(&mut self, parts: &[Expr], span: Span) -> Value {
@@ -134,6 +137,11 @@ impl Lowering<'_> {
                 }
                 None => diagnostic,
             });
+            return None;
+        }
+        if start.abs().max(end.abs()) > MOST_COUNTED {
+            let message = format!("a range goes up to {MOST_COUNTED:.0} at most, found {start} .. {end}");
+            self.report(Diagnostic::error(Code::OUT_OF_RANGE, whole, message));
             return None;
         }
         if start >= end && !matches!(op, Fold::Sum | Fold::Product) {

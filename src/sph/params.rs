@@ -136,7 +136,7 @@ impl Parameters {
         let numbers = [
             ("rest_density", self.rest_density, Bound::Positive),
             ("particle_mass", self.particle_mass, Bound::Positive),
-            ("packing", self.packing, Bound::Positive),
+            ("packing", self.packing, Bound::Fraction),
             ("support_radius", self.support_radius, Bound::Positive),
             ("viscosity", self.viscosity, Bound::NotNegative),
             ("surface_tension", self.surface_tension, Bound::NotNegative),

@@ -115,29 +115,58 @@ pub fn of_a_profile(name: &str, arguments: &str) -> Option<String> {
     }
 }
 
-/// A shape of OpenSCAD with its arguments, as it is called here; `None` for another name.
+/// A shape of OpenSCAD with its arguments, as it is called here; `None` for another name, or arguments that it does not have.
 pub fn shape(name: &str, arguments: &str) -> Option<String> {
-    let whole = arguments.trim();
-    let (first, rest) = match whole.strip_prefix('[').and_then(|inner| inner.split_once(']')) {
-        Some((size, rest)) => (size, rest),
-        None => whole.split_once(',').unwrap_or((whole, "")),
-    };
-    let (is_centred, has_names) = (rest.contains("true"), first.contains('='));
-    let sides: Vec<&str> = first.split(',').map(str::trim).filter(|side| !side.is_empty()).collect();
-    match (name, &sides[..]) {
-        ("cube", [x, y, z]) if is_centred => Some(format!("box(-[{x}, {y}, {z}]/2, [{x}, {y}, {z}]/2)")),
-        ("cube", [x, y, z]) => Some(format!("box([0, 0, 0], [{x}, {y}, {z}])")),
-        ("cube", [side]) if !has_names => Some(format!("box([0, 0, 0], [{side}, {side}, {side}])")),
-        ("cube", _) => Some("box([0, 0, 0], [1, 1, 1])".into()),
-        ("square", [w, h]) => Some(format!("polygon([[0, 0], [{w}, 0], [{w}, {h}], [0, {h}]])")),
-        ("square", [side]) if !has_names => {
-            Some(format!("polygon([[0, 0], [{side}, 0], [{side}, {side}], [0, {side}]])"))
+    let (mut size, mut is_centred) = (None, false);
+    for part in at_commas(arguments) {
+        match part.split_once('=').map(|(key, value)| (key.trim(), value.trim())) {
+            None if size.is_none() => size = Some(part.to_string()),
+            Some(("size" | "r", value)) => size = Some(value.to_string()),
+            Some(("d", value)) => size = Some(format!("{}/2", operand(value))),
+            Some(("center", value)) => is_centred = value == "true",
+            None | Some(_) => return None,
         }
-        ("square", _) => Some("polygon([[0, 0], [1, 0], [1, 1], [0, 1]])".into()),
-        ("circle", [r]) if !has_names => Some(format!("(x^2 + y^2 <= {}^2)", operand(r))),
-        ("circle", _) => Some("(x^2 + y^2 <= 1)".into()),
+    }
+    let size = size.unwrap_or_else(|| "1".into());
+    let sides: Vec<&str> = match size.strip_prefix('[').and_then(|inner| inner.strip_suffix(']')) {
+        Some(inner) => at_commas(inner),
+        None => vec![&size],
+    };
+    match (name, &sides[..]) {
+        ("cube", [side]) => Some(cuboid([side; 3], is_centred)),
+        ("cube", [x, y, z]) => Some(cuboid([x, y, z], is_centred)),
+        ("square", [side]) => Some(rectangle([side; 2], is_centred)),
+        ("square", [w, h]) => Some(rectangle([w, h], is_centred)),
+        ("circle", [r]) => Some(format!("(x^2 + y^2 <= {}^2)", operand(r))),
         _ => None,
     }
+}
+
+/// The arguments between the commas that stand outside of brackets.
+fn at_commas(text: &str) -> Vec<&str> {
+    let mut depth = 0_i32;
+    let is_end = |c: char| {
+        depth += match c {
+            '(' | '[' => 1,
+            ')' | ']' => -1,
+            _ => 0,
+        };
+        c == ',' && depth == 0
+    };
+    text.split(is_end).map(str::trim).filter(|part| !part.is_empty()).collect()
+}
+
+fn cuboid([x, y, z]: [&str; 3], is_centred: bool) -> String {
+    if is_centred {
+        format!("box(-[{x}, {y}, {z}]/2, [{x}, {y}, {z}]/2)")
+    } else {
+        format!("box([0, 0, 0], [{x}, {y}, {z}])")
+    }
+}
+
+fn rectangle([w, h]: [&str; 2], is_centred: bool) -> String {
+    let polygon = format!("polygon([[0, 0], [{w}, 0], [{w}, {h}], [0, {h}]])");
+    if is_centred { format!("{polygon}.move(-[{w}, {h}, 0]/2)") } else { polygon }
 }
 
 /// The turns that `rotate(…)` means elsewhere: three angles about the axes, or one about z.

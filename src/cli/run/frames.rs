@@ -217,8 +217,7 @@ impl Frames {
             .map(|saved| saved.fastest)
             .try_fold(0.0, |most: f64, one| one.map(|one| most.max(one)));
         let better = fastest.and_then(|fastest| pictures.better_end(fastest));
-        // pictures before a resumed run went on may have been drawn again at its first end
-        let Some(end) = better.or(pictures.expected.filter(|_| options.resume)) else { return Ok(None) };
+        let Some(end) = better else { return Ok(None) };
         let meshes = self.bodies.meshes_at_start()?;
         let look = Look { fastest: Some(end), ..Look::of(options) };
         let mut pictures = Pictures::new(look, experiment, &meshes)?;

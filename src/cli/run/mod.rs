@@ -148,7 +148,8 @@ fn conclude(
     if shared.json {
         output::json(&summary)?;
     }
-    let fitted = if is_whole { frames.fit_colours(options, experiment)? } else { None };
+    // a picture that cannot be drawn again, as that of a frame that was removed, keeps its colours
+    let fitted = if is_whole { frames.fit_colours(options, experiment).unwrap_or_default() } else { None };
     match stopped {
         None => {
             if !shared.json {

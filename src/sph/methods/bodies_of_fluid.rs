@@ -57,7 +57,7 @@ struct Body {
 /// Removes the resultant and the torque from the forces on bodies, as far as no wall holds them. `force` holds the
 /// force of each particle over its mass, `weight` how far it belongs to the surface.
 pub(super) fn balance(core: &Core, wetting: &Wetting, force: &mut Vectors, weight: &[f64]) {
-    let (of, count) = bodies(core);
+    let (of, count) = bodies(core, core.parameters.support_radius);
     let mut bodies = vec![Body::NONE; count];
     let position = &core.particles.position;
     for (i, &k) in of.iter().enumerate() {
@@ -140,9 +140,8 @@ impl Body {
     }
 }
 
-/// The body of each particle, and the number of bodies.
-fn bodies(core: &Core) -> (Vec<usize>, usize) {
-    let h = core.parameters.support_radius;
+/// The body of each particle, and the number of bodies, by a grid with this spacing, m.
+pub(super) fn bodies(core: &Core, h: f64) -> (Vec<usize>, usize) {
     let from = core.boundary.domain.min;
     let cell_of = |p: DVec3| ((p - from) / h).floor().to_array().map(|n| n as i64);
     let mut cells: HashMap<[i64; 3], usize> = HashMap::new();

@@ -100,8 +100,9 @@ impl Slip<'_> {
             let inner = [&before[open + 1..], &behind[..closing(behind)?]].concat();
             let kept: Vec<&str> = parts(&inner).into_iter().filter(|part| !part.starts_with('$')).collect();
             let arguments = kept.join(", ");
-            let shape = foreign::shape(function, &arguments);
-            Some(shape.unwrap_or_else(|| format!("{function}({arguments})")))
+            // arguments with a name may be called otherwise here
+            let as_written = || (!arguments.contains('=')).then(|| format!("{function}({arguments})"));
+            foreign::shape(function, &arguments).or_else(as_written)
         });
         Some(self.unexpected().help(match call.filter(|call| fits(&[call]) && !call.starts_with('(')) {
             Some(call) => format!("{exact}: write `{call}`"),

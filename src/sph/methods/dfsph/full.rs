@@ -12,24 +12,31 @@
 const EVENED: f64 = 0.5;
 
 /// Finds the rates of density, kg/m³/s, that pressure has to take away, from those of the velocities, the densities,
-/// kg/m³, and the debts, kg/m³, which are paid back within `relaxation`, s. The mean of the result is zero.
+/// kg/m³, and the debts, kg/m³, which are paid back within `relaxation`, s. Each of the `count` bodies of fluid, as in two
+/// chambers, has its own means: `of` says to which one a particle belongs. The mean of the result over a body is zero.
 pub(super) fn find_unwanted(
     free: &mut Vec<f64>,
+    (of, count): &(Vec<usize>, usize),
     (rates, densities, debts): (&[f64], &[f64], &[f64]),
     relaxation: f64,
 ) {
-    let n = densities.len().max(1) as f64;
-    let mean_density = densities.iter().sum::<f64>() / n;
+    let mean_density = means(densities, of, *count);
     free.clear();
-    free.extend(
-        rates
-            .iter()
-            .zip(densities)
-            .zip(debts)
-            .map(|((rate, density), debt)| rate + (EVENED * (density - mean_density) + debt) / relaxation),
-    );
-    let mean = free.iter().sum::<f64>() / n;
-    free.iter_mut().for_each(|rate| *rate -= mean);
+    free.extend(rates.iter().zip(densities).zip(debts).zip(of).map(|(((rate, density), debt), body)| {
+        rate + (EVENED * (density - mean_density[*body]) + debt) / relaxation
+    }));
+    let mean = means(free, of, *count);
+    free.iter_mut().zip(of).for_each(|(rate, body)| *rate -= mean[*body]);
+}
+
+/// The mean of the numbers of each body.
+fn means(numbers: &[f64], of: &[usize], count: usize) -> Vec<f64> {
+    let mut sums = vec![(0.0, 0.0); count];
+    for (number, body) in numbers.iter().zip(of) {
+        sums[*body].0 += number;
+        sums[*body].1 += 1.0;
+    }
+    sums.into_iter().map(|(sum, n)| sum / n).collect()
 }
 
 #[cfg(test)]
@@ -37,12 +44,22 @@ mod tests {
     use super::find_unwanted;
 
     #[test]
-    fn only_differences_count() {
+    fn only_differences_within_a_body_count() {
         let mut free = vec![7.0];
-        find_unwanted(&mut free, (&[4.0, 4.0, 4.0], &[990.0; 3], &[2.0; 3]), 0.1);
+        let one = (vec![0; 3], 1);
+        find_unwanted(&mut free, &one, (&[4.0, 4.0, 4.0], &[990.0; 3], &[2.0; 3]), 0.1);
         assert!(free.iter().all(|rate| rate.abs() < 1e-12), "{free:?}");
         // what is denser than the mean has to expand, what is thinner may be compressed, what is owed is paid
-        find_unwanted(&mut free, (&[0.0; 3], &[1000.0, 998.0, 999.0], &[0.0, 0.0, 3.0]), 0.5);
+        find_unwanted(&mut free, &one, (&[0.0; 3], &[1000.0, 998.0, 999.0], &[0.0, 0.0, 3.0]), 0.5);
         assert_eq!(free.iter().map(|rate| rate.round()).collect::<Vec<_>>(), [-1.0, -3.0, 4.0]);
+        // two chambers, one denser than the other
+        let two = (vec![0, 1, 0, 1], 2);
+        find_unwanted(
+            &mut free,
+            &two,
+            (&[1.0, 5.0, 3.0, 5.0], &[980.0, 950.0, 980.0, 950.0], &[0.0; 4]),
+            0.1,
+        );
+        assert_eq!(free, [-1.0, 0.0, 1.0, 0.0]);
     }
 }

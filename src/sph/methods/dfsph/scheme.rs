@@ -68,6 +68,7 @@ use glam::DMat3;
 use smallvec::{SmallVec, smallvec};
 
 use super::super::{
+    bodies_of_fluid::bodies,
     free_surface::FreeSurface,
     roughness::{self, Roughness},
     scheme::{Scheme, Start},
@@ -173,7 +174,7 @@ pub struct DivergenceFree {
 }
 
 /// The room that the particles of a fluid have which fills its vessel, over their volume: one over the mean of their
-/// G. Packing them leaves gaps, so they are lighter than their room, and their sums smaller. (With G of each particle
+/// G. Packing them leaves gaps, so their sums are smaller than those of their room. (With G of each particle
 /// forces in pairs would not conserve momentum.)
 fn room_over_volume(spread: &[f64]) -> f64 {
     let mean = spread.iter().sum::<f64>() / spread.len().max(1) as f64;
@@ -421,7 +422,9 @@ impl DivergenceFree {
         self.forces.find_rate_of(core, &self.walls, &core.particles.velocity, RateOf::Velocity(&self.whole));
         let found = (&self.forces.rate[..], &self.loaded[..], &self.debt[..]);
         if core.parameters.fills_vessel {
-            full::find_unwanted(&mut self.free, found, relaxation);
+            // particles that have a wall of a spacing between them belong to two bodies
+            let bodies = bodies(core, core.parameters.spacing());
+            full::find_unwanted(&mut self.free, &bodies, found, relaxation);
         } else {
             let (rates, densities, debts) = found;
             let unwanted = |((rate, rho), debt): ((&f64, &f64), &f64)| {

@@ -50,9 +50,9 @@ const FITTING: f64 = 0.95;
 
 /// Largest part of its room that the volumes of particles take in a fluid without a surface. A lattice that fills a box
 /// to its walls has the greatest allowed density, and any other arrangement is denser. Once the fluid flows,
-/// displacements cannot remove this excess: with 0.98 a hundredth of the particles in vortices is 2 % too dense, and
-/// with all of the room 11 %. (Packed vessels of other shapes reach 0.945 to 0.96 by themselves.)
-const LOOSEST: f64 = 0.97;
+/// displacements cannot remove this excess: with 0.97 a hundredth of 512 particles in a vortex is 1 % too dense, and with
+/// all of the room a hundredth of 3456 is 11 %. (Packed vessels of other shapes reach 0.945 to 0.96 by themselves.)
+const LOOSEST: f64 = 0.95;
 
 /// Mean compression that may be left in a fluid of another method: a tenth of the compression by its motion.
 const SPREAD_TOLERANCE: f64 = 1e-3;
@@ -137,7 +137,8 @@ impl DivergenceFree {
         let last = densities.len().saturating_sub(1);
         let (_, density, _) =
             densities.select_nth_unstable_by((FITTING * last as f64) as usize, f64::total_cmp);
-        core.pack((core.parameters.rest_density / *density).min(LOOSEST));
+        let packing = core.parameters.packing * core.parameters.rest_density / *density;
+        core.pack(packing.min(LOOSEST));
         self.find_lattice(&core.parameters);
         self.settle(core, &mut velocity.components_mut());
     }

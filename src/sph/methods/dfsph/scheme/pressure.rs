@@ -50,6 +50,8 @@ impl DivergenceFree {
     /// particle moves by a spacing. Packed particles are heavier than they count in the sums, and so is their weight.
     pub(super) fn report_pressure(&mut self, core: &mut Core, dt: f64, relaxation: f64) {
         let Constants { kernel, rest_density, .. } = Constants::of(&core.parameters);
+        // the field of the sums, which is divided by the packing below
+        let rest_density = core.parameters.packing * rest_density;
         self.field.resize(self.free.len(), 0.0);
         // the displacements of this step are not known yet
         let push = &mut self.displacement;
