@@ -133,7 +133,8 @@ scene work {{
 }
 
 /// A drum that turns in a fluid which sticks to it: at last its power is what the closed form says,
-/// 4πµLΩ²·a²b²/(b² − a²). With five spacings across the gap the friction is off by some per cent.
+/// 4πµLΩ²·a²b²/(b² − a²). With five spacings across the gap the friction is a sixth too large; it was a tenth too
+/// large when packing took 5 % of the mass, and with it of all forces.
 #[test]
 fn a_drum_works_by_friction() {
     let mut simulation = simulation(
@@ -159,7 +160,7 @@ scene work {
     let power = (late - early) / 0.5;
     let exact = 4.0 * std::f64::consts::PI * 100.0 * 0.4 * 4.0 * 0.25 / 0.75;
     println!("{power:.1} W for {exact:.1}");
-    assert!((power / exact - 1.0).abs() < 0.15, "{power} {exact}");
+    assert!((power / exact - 1.0).abs() < 0.2, "{power} {exact}");
     assert!(simulation.audit().energy_excess().unwrap() < 1e-2);
 }
 
