@@ -5,6 +5,7 @@
 //! box's size, that of values alone with its size.
 
 use glam::DVec3;
+use smallvec::{SmallVec, smallvec};
 
 use super::backward;
 use super::contractor::{Contractor, SCRATCH, Scratch, Wanted};
@@ -15,6 +16,7 @@ use super::sets::{Contracted, meet};
 use crate::geom::Aabb;
 use crate::interval::Interval;
 use crate::ir::bounds::range::{Region, conjunction_weight, is_zero};
+use crate::ir::derived::forward::MOST_PARTS;
 use crate::ir::function::BinaryFunction;
 use crate::ir::graph::{Axis, Expr, Node};
 use crate::ir::lookup::{Part, Tables};
@@ -28,6 +30,9 @@ const ONE: Interval = Interval::point(1.0);
 const TWO: Interval = Interval::point(2.0);
 
 type Slopes = [Interval; 3];
+
+/// Something for each part of a length.
+type Parts<T> = SmallVec<[T; 4]>;
 
 impl Contractor {
     /// Cuts off the parts that the formula's derivatives exclude. This pays in boxes that are small on the
@@ -147,10 +152,52 @@ fn fill(contractor: &Contractor, scratch: &mut Scratch) {
                 let factor = TWO * p * r * value + (p * s + r * q);
                 scaled(factor, de)
             }
+            Rule::Plain(Expr::Unary(Unary::Sqrt, sum))
+                if let Some(parts) = parts_of_length(&contractor.rules, sum) =>
+            {
+                slopes_of_length(&parts.into_iter().map(of).collect::<Parts<_>>())
+            }
             Rule::Plain(expr) => plain(expr, of, values[i], &contractor.tables),
         };
         slopes.push(slope);
     }
+}
+
+/// a, b, … of a² + b² + …, if a node is a sum of two squares or more.
+fn parts_of_length(rules: &[Rule], sum: Node) -> Option<Parts<Node>> {
+    let (mut parts, mut waiting): (Parts<Node>, Parts<Node>) = (Parts::new(), smallvec![sum]);
+    while let Some(node) = waiting.pop() {
+        if parts.len() + waiting.len() >= MOST_PARTS {
+            return None;
+        }
+        match rules[node.index()] {
+            Rule::Plain(Expr::Binary(Binary::Add, a, b)) => waiting.extend([a, b]),
+            Rule::Power { of, exponent: 2 } => parts.push(of),
+            Rule::Plain(_) | Rule::Power { .. } | Rule::Slab { .. } => return None,
+        }
+    }
+    (parts.len() > 1).then_some(parts)
+}
+
+/// The slopes of √(a² + b² + …) from the values and slopes of its parts. The share of each is a/√(a² + …), from −1
+/// to 1 also where all parts vanish; a quotient by the root would have any size near there.
+fn slopes_of_length(parts: &[(Interval, Slopes)]) -> Slopes {
+    let mut sum = [ZERO; 3];
+    for (k, &(part, slopes)) in parts.iter().enumerate().filter(|(_, (_, slopes))| *slopes != [ZERO; 3]) {
+        let others = parts.iter().enumerate().filter(|(other, _)| *other != k).map(|(_, (value, _))| *value);
+        let others = match parts.len() {
+            2 => others.fold(ZERO, |_, other| other),
+            _ => others.fold(ZERO, |sum, other| sum + other.square()).sqrt(),
+        };
+        let share = scaled(ONE - conjunction_weight(part, others), slopes);
+        // a sum is rounded outwards, and zeros are to stay zeros
+        sum = std::array::from_fn(|i| match (sum[i] == ZERO, share[i] == ZERO) {
+            (true, _) => share[i],
+            (false, true) => sum[i],
+            (false, false) => sum[i] + share[i],
+        });
+    }
+    sum
 }
 
 fn plain(expr: Expr, of: impl Fn(Node) -> (Interval, Slopes), value: Interval, tables: &Tables) -> Slopes {
@@ -260,4 +307,30 @@ fn scaled(factor: Interval, slopes: Slopes) -> Slopes {
 
 fn constant_or_unknown(slopes: Slopes) -> Slopes {
     slopes.map(|slope| if slope == ZERO { ZERO } else { Interval::ALL })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::ir::graph::Graph;
+
+    /// √(max(x, 0)² + y²): where it has no derivative either, each slope is from −1 to 1, and where one part vanishes
+    /// it is that of the other.
+    #[test]
+    fn slopes_of_lengths_are_bounded() {
+        let mut graph = Graph::default();
+        let [x, y] = [Axis::X, Axis::Y].map(|axis| graph.coordinate(axis));
+        let zero = graph.constant(0.0);
+        let part = graph.binary(Binary::Max, x, zero);
+        let squares = [part, y].map(|part| graph.binary(Binary::Mul, part, part));
+        let sum = graph.binary(Binary::Add, squares[0], squares[1]);
+        let root = graph.unary(Unary::Sqrt, sum);
+        let contractor = Contractor::new(&graph, root);
+        let slopes = |min: DVec3, max: DVec3| contractor.slopes(&Region::of(&Aabb::new(min, max)));
+        let around = slopes(DVec3::splat(-1.0), DVec3::splat(1.0)).unwrap();
+        assert!(around.iter().all(|slope| slope.lo >= -1.0 - 1e-12 && slope.hi <= 1.0 + 1e-12), "{around:?}");
+        let beside = slopes(DVec3::new(-2.0, 1.0, 0.0), DVec3::new(-1.0, 2.0, 1.0)).unwrap();
+        assert!(beside[0] == ZERO && beside[2] == ZERO, "{beside:?}");
+        assert!((beside[1].lo - 1.0).abs() < 1e-12 && (beside[1].hi - 1.0).abs() < 1e-12, "{beside:?}");
+    }
 }

@@ -56,6 +56,10 @@ fn slopes_of(graph: &mut Graph, node: Node, of: impl Fn(Node) -> Slopes) -> Slop
         Expr::Binary(Binary::MulOrZero, a, b) if of(b) == [None; 3] => {
             of(a).map(|slope| slope.map(|a| graph.binary(Binary::MulOrZero, a, b)))
         }
+        Expr::Unary(Unary::Sqrt, sum) if let Some(parts) = parts_of_length(graph, sum) => {
+            let slopes: Vec<Slopes> = parts.iter().map(|part| of(*part)).collect();
+            slopes_of_length(graph, &parts, &slopes)
+        }
         Expr::Constant(_) | Expr::Parameter(_) | Expr::Uniform(_) => [None; 3],
         Expr::Unary(op, _) if op.is_step() => [None; 3],
         Expr::Unary(..) | Expr::Binary(..) | Expr::Lookup(..) => {
@@ -69,6 +73,67 @@ fn slopes_of(graph: &mut Graph, node: Node, of: impl Fn(Node) -> Slopes) -> Slop
             }
             sum
         }
+    }
+}
+
+/// A length of more parts is a root like others: each part asks for the length of all others, and sums may share sums.
+pub(in crate::ir) const MOST_PARTS: usize = 8;
+
+/// a, b, … of a² + b² + …, if a node is a sum of two squares or more.
+fn parts_of_length(graph: &Graph, sum: Node) -> Option<Vec<Node>> {
+    let (mut parts, mut waiting) = (Vec::new(), vec![sum]);
+    while let Some(node) = waiting.pop() {
+        if parts.len() + waiting.len() >= MOST_PARTS {
+            return None;
+        }
+        match graph.expr(node) {
+            Expr::Binary(Binary::Add, a, b) => waiting.extend([b, a]),
+            Expr::Binary(Binary::Mul, a, b) if a == b => parts.push(a),
+            Expr::Unary(..)
+            | Expr::Binary(..)
+            | Expr::Constant(_)
+            | Expr::Coordinate(_)
+            | Expr::Parameter(_)
+            | Expr::Uniform(_)
+            | Expr::Lookup(..) => return None,
+        }
+    }
+    (parts.len() > 1).then_some(parts)
+}
+
+/// The derivatives of √(a² + b² + …): those of each part, times its share a/√(a² + …). This is from −1 to 1 also where
+/// all parts vanish and the root has no derivative; a quotient by the root would have any size near there.
+fn slopes_of_length(graph: &mut Graph, parts: &[Node], slopes: &[Slopes]) -> Slopes {
+    let one = graph.constant(1.0);
+    let mut sum: Slopes = [None; 3];
+    for (k, (&part, slopes)) in
+        parts.iter().zip(slopes).enumerate().filter(|(_, (_, slopes))| **slopes != [None; 3])
+    {
+        let others = parts.iter().enumerate().filter(|(other, _)| *other != k).map(|(_, part)| *part);
+        let others = length(graph, &others.collect::<Vec<_>>());
+        // the weight of R₀, whose range is known at the corner
+        let weight = graph.binary(Binary::AndWeight, part, others);
+        let share = graph.binary(Binary::Sub, one, weight);
+        for (so_far, slope) in sum.iter_mut().zip(slopes) {
+            let Some(slope) = slope else { continue };
+            let term = product(graph, share, *slope);
+            *so_far = Some(so_far.map_or(term, |so_far| graph.binary(Binary::Add, so_far, term)));
+        }
+    }
+    sum
+}
+
+/// √(a² + b² + …); a itself if it is the only part.
+fn length(graph: &mut Graph, parts: &[Node]) -> Node {
+    let mut sum = None;
+    for &part in parts {
+        let square = graph.binary(Binary::Mul, part, part);
+        sum = Some(sum.map_or(square, |sum| graph.binary(Binary::Add, sum, square)));
+    }
+    match (parts, sum) {
+        ([part], _) => *part,
+        (_, Some(sum)) => graph.unary(Unary::Sqrt, sum),
+        (_, None) => graph.constant(0.0),
     }
 }
 
@@ -137,6 +202,31 @@ mod tests {
             let (a, b) = values.split_at(3);
             // some roundings apart, of sums of a few numbers below 10
             assert!(std::iter::zip(a, b).all(|(a, b)| (a - b).abs() < 1e-14 * 10.0), "{values:?}");
+        }
+    }
+
+    /// √(x² + y²) and √(x² + y² + z²), which have no derivative where all parts vanish.
+    #[test]
+    fn slopes_of_lengths_are_bounded() {
+        let mut graph = Graph::default();
+        let parts = [Axis::X, Axis::Y, Axis::Z].map(|axis| graph.coordinate(axis));
+        let roots = [length(&mut graph, &parts[..2]), length(&mut graph, &parts)];
+        for (root, count) in roots.into_iter().zip([2, 3]) {
+            let (forward, reverse) = (forward_gradient(&mut graph, root), gradient(&mut graph, root));
+            let interpreter = Interpreter::new(&graph, &[forward, reverse].concat());
+            let mut values = [0.0; 6];
+            interpreter.eval_f64([0.75, -2.0, 0.5], &mut values);
+            // some roundings of numbers up to 2 apart
+            assert!((0..3).all(|i| (values[i] - values[i + 3]).abs() < 1e-15), "{values:?}");
+            let around = Aabb::new(DVec3::splat(-0.5), DVec3::splat(1.0));
+            let beside = Aabb::new(DVec3::new(1.0, -0.1, -0.1), DVec3::new(2.0, 0.1, 0.1));
+            for axis in 0..count {
+                let range = |over| RangeEvaluator::new(&graph, forward[axis]).eval(over);
+                let (any, some) = (range(&around), range(&beside));
+                assert!(any.lo >= -1.0 - 1e-15 && any.hi <= 1.0 + 1e-15, "{any:?}");
+                let expected = if axis == 0 { Interval::new(0.98, 1.0) } else { Interval::new(-0.1, 0.1) };
+                assert!(some.lo >= expected.lo - 1e-12 && some.hi <= expected.hi + 1e-12, "{some:?}");
+            }
         }
     }
 

@@ -75,10 +75,13 @@ impl SlopeProgram {
             return None;
         }
         let mut graph = shape.graph.clone();
-        let is_choice = |expr: &Expr| {
-            matches!(expr, Expr::Binary(Binary::Min | Binary::PlainMin | Binary::Max | Binary::PlainMax, ..))
+        // what reverse mode does not know: which operand is chosen, and lengths that vanish
+        let needs_forward_mode = |expr: &Expr| {
+            let is_length = matches!(expr, Expr::Unary(Unary::Sqrt, _));
+            let (min, max) = ([Binary::Min, Binary::PlainMin], [Binary::Max, Binary::PlainMax]);
+            is_length || matches!(expr, Expr::Binary(op, ..) if min.contains(op) || max.contains(op))
         };
-        let (graph, roots) = if graph.exprs().iter().any(is_choice) {
+        let (graph, roots) = if graph.exprs().iter().any(needs_forward_mode) {
             let [x, y, z] = ir::forward_gradient(&mut graph, shape.root);
             graph.extract(&[shape.root, x, y, z])
         } else {
