@@ -2,6 +2,7 @@
 //! them.
 
 use std::sync::OnceLock;
+use std::sync::atomic::{AtomicU32, Ordering};
 
 use super::block_program::BlockProgram;
 use super::compiled::{BatchProgram, PointProgram};
@@ -39,10 +40,19 @@ type Slot<P> = OnceLock<Result<P, CodegenError>>;
 /// points.
 const LARGE: usize = 1500;
 
+/// After so many single points they have cost what the program for them takes to be made, for a graph of up to
+/// [`HUGE`] nodes. A point costs a tenth with it: a block computes sixteen at least.
+const MANY_POINTS: u32 = 4096;
+
+/// What it takes grows faster than the graph: there are no programs for single points of larger ones.
+const HUGE: usize = 16_000;
+
 /// The compiled programs of one precision.
 pub struct Compiled<T> {
     point: Slot<PointProgram<T>>,
     batch: Slot<Many<T>>,
+    /// Single points that the program over blocks has answered for.
+    points: AtomicU32,
 }
 
 /// What answers for many points.
@@ -76,7 +86,7 @@ impl Lane for f64 {
 
 impl<T> Compiled<T> {
     fn new() -> Self {
-        Self { point: OnceLock::new(), batch: OnceLock::new() }
+        Self { point: OnceLock::new(), batch: OnceLock::new(), points: AtomicU32::new(0) }
     }
 }
 
@@ -186,6 +196,15 @@ impl Programs {
         }
     }
 
+    /// Whether a program for single points pays for a graph that is answered by its program over blocks. One more
+    /// point is counted.
+    fn has_many_points<T: Lane>(&self) -> bool {
+        let points = &T::compiled(self).points;
+        self.graph.len() <= HUGE
+            && (points.load(Ordering::Relaxed) >= MANY_POINTS
+                || points.fetch_add(1, Ordering::Relaxed) >= MANY_POINTS)
+    }
+
     /// Makes the program for single points now, rather than when it is first asked for.
     ///
     /// # Errors
@@ -208,7 +227,7 @@ impl Programs {
         let uniforms = T::uniforms(uniforms);
         if engine == Engine::Interpreter {
             T::interpret(&self.interpreter, p, uniforms, out);
-        } else if let Some(program) = self.large_program::<T>() {
+        } else if let Some(program) = self.large_program::<T>().filter(|_| !self.has_many_points::<T>()) {
             program.call_one(p, uniforms, out);
         } else if let Ok(program) = self.point_program::<T>() {
             program.call(p, uniforms, out);
