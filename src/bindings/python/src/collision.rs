@@ -33,6 +33,9 @@ pub fn collide<'py>(
 ) -> PyResult<Bound<'py, PyAny>> {
     static CLASS: PyOnceLock<Py<PyType>> = PyOnceLock::new();
     let py = positions.py();
+    if positions.is(velocities) {
+        return Err(PyValueError::new_err("positions and velocities are the same array"));
+    }
     let (x, v) = (vectors(positions, "positions")?, vectors(velocities, "velocities")?);
     if x.count != v.count {
         return Err(PyValueError::new_err(format!("{} positions, but {} velocities", x.count, v.count)));

@@ -7,7 +7,7 @@ use numpy::{PyArray, PyArray1, PyArrayMethods};
 use pyo3::exceptions::{PyTypeError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::sync::PyOnceLock;
-use pyo3::types::PyType;
+use pyo3::types::{PyTuple, PyType};
 use rfm::Solid;
 use rfm::field::Entry;
 use rfm::glam::DVec3;
@@ -61,10 +61,21 @@ pub fn first_entry<'py>(
     CLASS.import(py, "rfm._records", "Entry")?.call1((part, point, normal, certain))
 }
 
-/// An array of doubles.
+/// An array of doubles, of shape (…, 3). Three arrays in a tuple are columns, as they are everywhere.
 fn doubles<'py>(given: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyAny>> {
     refuse_masked(given)?;
-    let array = numpy(given.py())?.call_method1("asarray", (given,))?;
+    let numpy = numpy(given.py())?;
+    let is_columns = match given.cast::<PyTuple>() {
+        Ok(parts) => parts.len() == 3 && parts.iter().all(|part| part.hasattr("ndim").unwrap_or(false)),
+        Err(_) => false,
+    };
+    let array = if is_columns {
+        let columns =
+            numpy.call_method1("broadcast_arrays", given.cast::<PyTuple>().map_err(PyErr::from)?.clone())?;
+        numpy.call_method1("stack", (columns, -1))?
+    } else {
+        numpy.call_method1("asarray", (given,))?
+    };
     let kind: String = array.getattr("dtype")?.getattr("kind")?.extract()?;
     if !["f", "i", "u", "b"].contains(&&*kind) {
         let found = array.getattr("dtype")?;

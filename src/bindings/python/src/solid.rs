@@ -52,6 +52,9 @@ pub struct PySolid {
     over: Option<Aabb>,
 }
 
+/// Cells along the longest side of a mesh, as of `rfm mesh`.
+const DEFAULT_CELLS: usize = 128;
+
 impl PySolid {
     /// A solid of a program during a stretch of time, for particles in a box.
     pub fn new(
@@ -384,7 +387,7 @@ impl PySolid {
     ///
     /// Parameters
     /// ----------
-    /// start, end : arrays of shape (..., 3), m, that broadcast together
+    /// start, end : arrays of shape (..., 3), m, or tuples of three arrays, that broadcast together
     /// threads : int, optional
     ///
     /// Returns
@@ -493,6 +496,10 @@ impl PySolid {
                 return Err(PyValueError::new_err(format!("the time is {time} s, expected a finite number")));
             }
         }
+        if start > end {
+            let message = format!("the stretch from {start} to {end} s ends before it begins");
+            return Err(PyValueError::new_err(message));
+        }
         Self::new(self.program.bind(py), self.solid.clone(), [start, end], self.over)
     }
 
@@ -524,8 +531,8 @@ impl PySolid {
     ///
     /// Parameters
     /// ----------
-    /// cells : int
-    ///     Cells along the longest side.
+    /// cells : int, optional
+    ///     Cells along the longest side; 128 if neither they nor their size are stated.
     /// cell : float, m, optional
     ///     Size of a cell instead of their number.
     /// method : "dc" or "mc"
@@ -536,22 +543,28 @@ impl PySolid {
     /// no_slivers : bool
     ///     Contract the shortest edges, so that no triangle is very thin.
     /// threads : int, optional
-    #[pyo3(signature = (cells=128, *, cell=None, method="dc", r#box=None, no_slivers=false, threads=Threads::Auto))]
+    #[pyo3(signature = (cells=None, *, cell=None, method="dc", r#box=None, no_slivers=false, threads=Threads::Auto))]
     #[pyo3(
-        text_signature = "($self, cells=128, *, cell=None, method='dc', box=None, no_slivers=False, threads=None)"
+        text_signature = "($self, cells=None, *, cell=None, method='dc', box=None, no_slivers=False, threads=None)"
     )]
     #[allow(clippy::too_many_arguments)] // they have names in Python
     fn mesh(
         &self,
         py: Python<'_>,
-        cells: usize,
+        cells: Option<usize>,
         cell: Option<f64>,
         method: &str,
         r#box: Option<&Bound<'_, PyAny>>,
         no_slivers: bool,
         threads: Threads,
     ) -> PyResult<PyMesh> {
-        let resolution = cell.map_or(mesh::Resolution::Cells(cells), mesh::Resolution::Spacing);
+        let resolution = match (cells, cell) {
+            (Some(_), Some(_)) => {
+                return Err(PyValueError::new_err("both cells and cell are given, expected one of them"));
+            }
+            (None, Some(cell)) => mesh::Resolution::Spacing(cell),
+            (cells, None) => mesh::Resolution::Cells(cells.unwrap_or(DEFAULT_CELLS)),
+        };
         let domain = r#box.map(aabb).transpose()?;
         let mesher = crate::mesh::mesher(method)?;
         let solid = self.solid.clone();

@@ -242,6 +242,26 @@ def test_a_moving_solid_is_seen_at_a_time():
     entry = door.between(0.0, 1.0).first_entry([1.05, 0.5, 0.5], [1.05, 0.5, 0.5])
     assert entry.part == pytest.approx(0.95) and entry.normal == pytest.approx([1, 0, 0])
     assert not rfm.load(EXAMPLES / "pawn.rfm")["pawn"].moves
+    with pytest.raises(ValueError, match="ends before it begins"):
+        door.between(2.0, 1.0)
+
+
+def test_paths_are_rows_or_three_columns():
+    ball = rfm.load("rfm 1\nsolid s = sphere(1)")["s"]
+    for count in [1, 3, 5]:
+        start, end = RNG.uniform(-3, 3, (count, 3)), np.zeros((count, 3))
+        rows, columns = ball.first_entry(start, end), ball.first_entry(tuple(start.T), tuple(end.T))
+        assert same(rows.part, columns.part) and same(rows.point, columns.point) and columns.part.shape == (count,)
+    assert ball.first_entry((2, 0, 0), (0, 0, 0)).part == pytest.approx(0.5)
+
+
+def test_contradictions_are_refused():
+    ball = rfm.load("rfm 1\nsolid s = sphere(1)")["s"]
+    points = RNG.uniform(-1, 1, (10, 3))
+    with pytest.raises(ValueError, match="the same array"):
+        ball.collide(points, points, reach=1.0)
+    with pytest.raises(ValueError, match="expected one of them"):
+        ball.mesh(cells=16, cell=0.1)
 
 
 @pytest.mark.parametrize("dtype", ["f8", "f4"])

@@ -228,7 +228,7 @@ class Solid:
     def volume(self, cells: int = 96, *, threads: int | None = None) -> float: ...
     def mesh(
         self,
-        cells: int = 128,
+        cells: int | None = None,
         *,
         cell: float | None = None,
         method: Literal["dc", "mc"] = "dc",
