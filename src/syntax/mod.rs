@@ -4,6 +4,7 @@
 //! name and computes no number. Every node carries its span.
 
 pub mod ast;
+mod brackets;
 mod build;
 pub mod foreign;
 mod format;

@@ -4,6 +4,7 @@ use pest::Parser;
 use pest::error::{Error, ErrorVariant, InputLocation};
 
 use super::ast::Ast;
+use super::brackets::Brackets;
 use super::build;
 use super::foreign;
 use super::grammar::{Grammar, Rule};
@@ -103,8 +104,9 @@ fn syntax_error(source: &Source, start: usize, end: usize, error: &Error<Rule>) 
             InputLocation::Pos(at) => at,
             InputLocation::Span((at, _)) => at,
         };
-    // at the end of an item, point behind its last character and not at the next item
-    let at = if at >= end { source.text[..end].trim_end().len().max(start.min(end)) } else { at };
+    // at the end of an item, point behind its last character and not at a comment or at the next item
+    let is_end = at >= end;
+    let at = if is_end { start + Brackets::of(&source.text[start..end]).end } else { at };
     let found = token_at(&source.text, at, end);
     let span = Span::new(source.id, at, at + found.len());
     let expects_name = matches!(&error.variant, ErrorVariant::ParsingError { positives, .. }
@@ -143,8 +145,25 @@ fn syntax_error(source: &Source, start: usize, end: usize, error: &Error<Rule>) 
         }
         ErrorVariant::CustomError { message } => message.clone(),
     };
+    let open = Brackets::of(&source.text[start..at]).open.pop();
+    let place = open.map(|open| Span::new(source.id, start + open.at, start + open.at + 1));
+    if let (Some(open), Some(place), true) = (open, place, is_end) {
+        return Diagnostic::error(Code::SYNTAX, place, format!("`{}` is not closed", open.bracket))
+            .label(span, format!("the item ends here without `{}`", open.close));
+    }
     let diagnostic = Diagnostic::error(Code::SYNTAX, span, format!("unexpected {what}"));
-    if expected.is_empty() { diagnostic } else { diagnostic.at(format!("expected {expected}")) }
+    let diagnostic =
+        if expected.is_empty() { diagnostic } else { diagnostic.at(format!("expected {expected}")) };
+    match (open, place) {
+        // a bracket on an earlier line may be the one that should have been closed
+        (Some(open), Some(place))
+            if expected.contains(&format!("`{}`", open.close))
+                && source.text[start + open.at..at].contains('\n') =>
+        {
+            diagnostic.label(place, format!("`{}` would close this", open.close))
+        }
+        _ => diagnostic,
+    }
 }
 
 /// What ends the condition or the value of an `if` without its next word.
