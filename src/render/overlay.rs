@@ -6,6 +6,7 @@ use std::fmt::Write;
 use resvg::tiny_skia::{Pixmap, Transform};
 
 use super::{ColourMap, RenderError, Rgb, image::Layer};
+use crate::geom::significant;
 
 /// The text beside the picture.
 #[derive(Debug, Clone, Copy)]
@@ -139,8 +140,11 @@ pub fn bar(values: &Scale<'_>, scale: f64) -> Result<Layer, RenderError> {
         top - 18.0,
         escaped(values.label)
     );
-    for (value, label) in round_values(values.low, values.high) {
-        let y = top + height * (values.high - value) / (values.high - values.low);
+    for (value, label) in marks(values.low, values.high) {
+        // where all values are one, particles have the colour of the low end
+        let span = values.high - values.low;
+        let part = if span > 0.0 { (values.high - value) / span } else { 1.0 };
+        let y = top + height * part;
         let right = left + width;
         let _ = write!(
             body,
@@ -190,6 +194,17 @@ fn grouped(number: u64) -> String {
     out
 }
 
+/// Round values of a range with their labels; or its only value, if it has no more than one.
+fn marks(low: f64, high: f64) -> Vec<(f64, String)> {
+    let marks = round_values(low, high);
+    if !(marks.is_empty() && low.is_finite() && high.is_finite() && low <= high) {
+        return marks;
+    }
+    let value = significant(low);
+    let is_plain = value == 0.0 || (1e-4..1e7).contains(&value.abs());
+    vec![(low, if is_plain { value.to_string() } else { format!("{value:e}") })]
+}
+
 /// Two to seven round values of a range with their labels. Empty if the range is empty or endless.
 fn round_values(low: f64, high: f64) -> Vec<(f64, String)> {
     let width = high - low;
@@ -234,6 +249,18 @@ mod tests {
         assert_eq!(range(987.0, 1012.0), "990 995 1000 1005 1010");
         assert_eq!(range(-0.25, 0.25), "-0.2 -0.1 0.0 0.1 0.2");
         assert_eq!(range(1e300, 1e300) + &range(1.0, 1.0 + 1e-15), "");
+    }
+
+    #[test]
+    fn a_range_of_one_value_has_its_number() {
+        let marks =
+            |low: f64, high: f64| marks(low, high).into_iter().map(|(_, l)| l).collect::<Vec<_>>().join(" ");
+        assert_eq!(marks(0.0, 0.0), "0");
+        assert_eq!(marks(998.29, 998.29), "998.29");
+        assert_eq!(marks(1.0 / 3.0, 1.0 / 3.0 + 1e-16), "0.333333");
+        assert_eq!(marks(-2e-9, -2e-9), "-2e-9");
+        assert_eq!(marks(0.0, 2.0), "0.0 0.5 1.0 1.5 2.0");
+        assert_eq!(marks(f64::NAN, f64::NAN) + &marks(1.0, f64::INFINITY) + &marks(1.0, 0.0), "");
     }
 
     #[test]
