@@ -36,8 +36,14 @@ impl Scale {
     /// The levels that suit a slice. On each side they are a series 1, 2, 5 · 10ⁿ or evenly spaced, whichever
     /// divides the samples better, and reach up to the 98th percentile of |ω| there.
     pub fn for_samples(samples: &Samples) -> Self {
+        Self::for_all(&[samples])
+    }
+
+    /// The levels that suit several slices together, as [`Scale::for_samples`].
+    pub fn for_all(slices: &[&Samples]) -> Self {
         let side = |sign: f64| {
-            let magnitudes = samples.omega.iter().map(|w| w * sign).filter(|w| *w > 0.0 && w.is_finite());
+            let values = slices.iter().flat_map(|samples| &samples.omega);
+            let magnitudes = values.map(|w| w * sign).filter(|w| *w > 0.0 && w.is_finite());
             let mut magnitudes: Vec<f64> = magnitudes.collect();
             magnitudes.sort_unstable_by(f64::total_cmp);
             let Some(top) = Decimal::below(percentile_98(&magnitudes)) else { return Vec::new() };

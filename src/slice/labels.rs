@@ -16,9 +16,30 @@ pub struct LevelLabel {
     pub text: String,
 }
 
+impl LevelLabel {
+    /// Whether a stretch of a line comes near it.
+    pub fn is_met_by(&self, from: DVec2, to: DVec2) -> bool {
+        let along = DVec2::from_angle(self.angle.to_radians());
+        let half = DVec2::new(0.5 * width(&self.text), 0.5 * HEIGHT) + BESIDE;
+        let is_near = |p: DVec2| {
+            let d = p - self.at;
+            d.dot(along).abs() < half.x && d.perp_dot(along).abs() < half.y
+        };
+        // as close together as labels are high
+        let count = (from.distance(to) / (0.5 * HEIGHT)).ceil().max(1.0);
+        (0..=count as usize).any(|k| is_near(from.lerp(to, k as f64 / count)))
+    }
+}
+
 /// The width of a character and the height of a label in type of 10 units.
 const CHARACTER: f64 = 5.6;
 const HEIGHT: f64 = 11.0;
+/// What arrows leave free around a label.
+const BESIDE: f64 = 2.5;
+
+fn width(text: &str) -> f64 {
+    CHARACTER * text.chars().count() as f64
+}
 
 /// Finds places for labels that do not disturb each other.
 #[derive(Debug)]
@@ -37,7 +58,7 @@ impl<'a> Placer<'a> {
 
     /// The best label for a text on the lines of a level. `None` if there is no room.
     pub fn place(&mut self, level: usize, text: &str) -> Option<LevelLabel> {
-        let width = CHARACTER * text.chars().count() as f64;
+        let width = width(text);
         let candidates = self.lines[level].iter().flat_map(|line| stations(line, width));
         let best = candidates
             .filter(|s| self.is_free(s, level, 0.5 * width))

@@ -13,7 +13,7 @@ use super::{
     paths,
     plane::Plane,
     sample::sample,
-    svg::{Drawing, LEFT, TOP, escaped, on_page},
+    svg::{BELOW, Drawing, LEFT, RIGHT, TOP, escaped, on_page},
 };
 use crate::field::Field;
 
@@ -30,12 +30,10 @@ const COLOURS: [&str; 6] = ["#d55e00", "#0072b2", "#009e73", "#cc79a7", "#56b4e9
 /// Directions of the hatching, degrees. Their number and that of the colours have no common factor, so 30
 /// solids differ.
 const ANGLES: [f64; 5] = [45.0, -45.0, 0.0, 90.0, 22.5];
-/// Room below the plot for its axis.
-const BELOW: f64 = 52.0;
 /// The legend: the gap before it, the height of a row, the swatch, and the width of a character.
 const LEGEND: [f64; 4] = [24.0, 24.0, 22.0, 7.4];
 
-/// Draws solids in a plane. `id` keeps the patterns of several drawings in one document apart.
+/// Draws solids in a plane, without a legend. `id` keeps the patterns of several drawings in one document apart.
 ///
 /// # Errors
 /// Those of [`sample`].
@@ -59,10 +57,17 @@ pub(super) fn drawing(
         region(&mut body, &frame, &found, colour, &format!("hatch{id}-{k}"));
     }
     axes::draw(&mut body, &frame, plane);
+    Ok(Drawing { size: DVec2::new(frame.right() + RIGHT, frame.bottom() + BELOW), body })
+}
+
+/// The names of solids with their colours and hatching, beside a plot whose upper right corner is `at`. `id` is that of
+/// a drawing of the same solids.
+pub(super) fn legend(cuts: &[Cut<'_>], at: DVec2, id: &str) -> Drawing {
+    let mut body = String::new();
     let widest = cuts.iter().map(|cut| cut.name.chars().count()).max().unwrap_or(0) as f64;
-    let left = frame.right() + LEGEND[0];
+    let left = at.x + LEGEND[0];
     for (k, cut) in cuts.iter().enumerate() {
-        let (colour, top) = (COLOURS[k % COLOURS.len()], frame.origin.y + LEGEND[1] * k as f64);
+        let (colour, top) = (COLOURS[k % COLOURS.len()], at.y + LEGEND[1] * k as f64);
         let [width, height] = [LEGEND[2], LEGEND[1] - 8.0];
         for fill in [format!(r#"{colour}" fill-opacity="0.18"#), format!("url(#hatch{id}-{k})")] {
             let _ = writeln!(
@@ -78,12 +83,8 @@ pub(super) fn drawing(
             escaped(&cut.name)
         );
     }
-    let legend = frame.origin.y + LEGEND[1] * cuts.len() as f64;
-    let size = DVec2::new(
-        left + LEGEND[2] + 8.0 + LEGEND[3] * widest + 12.0,
-        frame.bottom().max(legend - BELOW) + BELOW,
-    );
-    Ok(Drawing { size: size.ceil(), body })
+    let right = left + LEGEND[2] + 8.0 + LEGEND[3] * widest + 12.0;
+    Drawing { size: DVec2::new(right, at.y + LEGEND[1] * cuts.len() as f64).ceil(), body }
 }
 
 /// Fills a region and draws its border.

@@ -6,12 +6,13 @@ use std::io;
 use glam::DVec2;
 
 use super::{
-    SliceError, Style, Window,
+    Quantity, SliceError, Style, Window,
+    colour::Scale,
     plane::Plane,
     png,
-    sample::sample,
+    sample::{Samples, sample},
     sections::{self, Cut},
-    svg::{Drawing, drawing},
+    svg::{BELOW, Drawing, RIGHT, TOP, bar, drawing},
 };
 
 /// A slice of a sheet: ω of one solid, or the sections of several.
@@ -58,15 +59,29 @@ pub fn write_sheet_png(
 }
 
 /// The document. Columns are as wide as their widest panel and rows as high as their highest, so nothing overlaps.
+/// Panels that show the same quantity have one scale and one colour bar, and panels of the same solids one legend.
 fn sheet(title: &str, panels: &[Panel<'_>], samples: usize) -> Result<String, SliceError> {
-    let draw = |(k, panel): (usize, &Panel<'_>)| match &panel.cuts[..] {
-        [one] => {
-            let samples = sample(one.field, panel.plane, panel.window, samples)?;
-            Ok(drawing(one.field, &one.name, &samples, panel.style, &k.to_string()))
-        }
-        several => sections::drawing(several, panel.plane, panel.window, samples, &k.to_string()),
+    let sampled = |panel: &Panel<'_>| match &panel.cuts[..] {
+        [one] => sample(one.field, panel.plane, panel.window, samples).map(Some),
+        _ => Ok(None),
     };
-    let drawings = panels.iter().enumerate().map(draw).collect::<Result<Vec<Drawing>, SliceError>>()?;
+    let sampled = panels.iter().map(sampled).collect::<Result<Vec<Option<Samples>>, SliceError>>()?;
+    let scales = [Quantity::Omega, Quantity::Distance].map(|quantity| {
+        let of = panels.iter().zip(&sampled).filter(|(panel, _)| panel.style.quantity == quantity);
+        let of: Vec<&Samples> = of.filter_map(|(_, samples)| samples.as_ref()).collect();
+        (quantity, (!of.is_empty()).then(|| Scale::for_all(&of)))
+    });
+    let draw = |(k, (panel, samples_of)): (usize, (&Panel<'_>, &Option<Samples>))| {
+        let scale = scales.iter().find(|(quantity, _)| *quantity == panel.style.quantity);
+        match (&panel.cuts[..], samples_of, scale) {
+            ([one], Some(sampled), Some((_, Some(scale)))) => {
+                Ok(drawing(one.field, &one.name, sampled, panel.style, scale, &k.to_string()))
+            }
+            (several, ..) => sections::drawing(several, panel.plane, panel.window, samples, &k.to_string()),
+        }
+    };
+    let drawings =
+        panels.iter().zip(&sampled).enumerate().map(draw).collect::<Result<Vec<Drawing>, SliceError>>()?;
     let columns = (1..).find(|n| n * n >= drawings.len()).unwrap_or(1);
     let greatest = |of: &dyn Fn(&Drawing) -> f64, pick: &dyn Fn(usize) -> bool| {
         let chosen = drawings.iter().enumerate().filter(|(k, _)| pick(*k));
@@ -86,8 +101,30 @@ fn sheet(title: &str, panels: &[Panel<'_>], samples: usize) -> Result<String, Sl
         let _ =
             write!(body, "<g transform=\"translate({} {})\">\n{part}</g>\n", x[k % columns], y[k / columns]);
     }
+    // the legends stand beside the first row
+    let mut bottom = y[rows];
+    let mut add = |legend: Drawing| {
+        body += &legend.body;
+        bottom = bottom.max(legend.size.y);
+        DVec2::new(legend.size.x, TOP)
+    };
+    let height = drawings.first().map_or(0.0, |drawing| drawing.size.y - TOP - BELOW);
+    let mut right = DVec2::new(x[columns] - GAP - RIGHT, TOP);
+    for (quantity, scale) in &scales {
+        if let Some(scale) = scale {
+            right = add(bar(scale, *quantity, right, height));
+        }
+    }
+    let mut named: Vec<Vec<&str>> = Vec::new();
+    for (k, panel) in panels.iter().enumerate().filter(|(_, panel)| panel.cuts.len() != 1) {
+        let names: Vec<&str> = panel.cuts.iter().map(|cut| cut.name.as_str()).collect();
+        if !names.is_empty() && !named.contains(&names) {
+            right = add(sections::legend(&panel.cuts, right, &k.to_string()));
+            named.push(names);
+        }
+    }
     // a ground that ends within a pixel would leave a grey line
-    Ok(Drawing { size: DVec2::new(x[columns], y[rows]).ceil(), body }.document(title))
+    Ok(Drawing { size: DVec2::new(right.x.max(x[columns]), bottom).ceil(), body }.document(title))
 }
 
 #[cfg(test)]
@@ -136,7 +173,8 @@ mod tests {
             .map(|panel| match &panel.cuts[..] {
                 [one] => {
                     let samples = sample(one.field, panel.plane, panel.window, 60).unwrap();
-                    drawing(one.field, &one.name, &samples, Style::default(), "").size
+                    let scale = Scale::for_samples(&samples);
+                    drawing(one.field, &one.name, &samples, Style::default(), &scale, "").size
                 }
                 several => sections::drawing(several, panel.plane, panel.window, 60, "").unwrap().size,
             })
@@ -146,10 +184,27 @@ mod tests {
             assert!(places[k + 1].0 >= sizes[k].x && places[k].1 == places[k + 1].1);
         }
         assert!((0..2).all(|k| places[k + 2].1 >= sizes[k].y));
+        // three panels of both solids have one legend, and that of one solid has the only colour bar
+        assert_eq!((text.matches(">square</text>").count(), text.matches("inside, ω").count()), (1, 1));
         // what a pattern is called occurs once
         for k in [0, 2, 3] {
             assert_eq!(text.matches(&format!("id=\"hatch{k}-0\"")).count(), 1);
         }
+    }
+
+    #[test]
+    fn panels_of_one_quantity_have_one_scale() {
+        let round = field(|p| 0.25 - p.length_squared());
+        let one: [(&str, &dyn Field); 1] = [("round", &round)];
+        let panels = [panel(&one, 0.0, 1.0), panel(&one, 0.3, 0.5)];
+        let text = sheet("one", &panels, 60).unwrap();
+        assert_eq!((text.matches("inside, ω").count(), text.matches("outside, ω").count()), (1, 1));
+        let colours = |z: f64, half: f64| {
+            let plane = Plane::new(Axis::Z, z);
+            let window = Window::new(DVec2::splat(-half), DVec2::new(half, 0.6 * half));
+            Scale::for_samples(&sample(&round, plane, window, 60).unwrap())
+        };
+        assert_ne!(colours(0.0, 1.0), colours(0.3, 0.5), "these would have different scales");
     }
 
     #[test]

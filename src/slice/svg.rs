@@ -21,7 +21,9 @@ use crate::field::Field;
 
 pub const LEFT: f64 = 72.0;
 pub const TOP: f64 = 44.0;
-const BELOW: f64 = 52.0;
+pub const BELOW: f64 = 52.0;
+/// Room beside the plot for the last number of its axis.
+pub const RIGHT: f64 = 16.0;
 /// The colour bar: the gap before it, its width, and the room for its title.
 const BAR: [f64; 3] = [26.0, 16.0, 22.0];
 /// The room for the numbers of the colour bar: that around them, and for each character.
@@ -52,17 +54,24 @@ impl Drawing {
 
 /// The slice as an SVG document. `name` becomes part of the title. The samples must be those of the field.
 pub fn svg(field: &dyn Field, name: &str, samples: &Samples) -> String {
-    drawing(field, name, samples, Style::default(), "").document(&format!("{name}, {} m", samples.plane))
+    let (style, scale) = (Style::default(), Scale::for_samples(samples));
+    let plot = drawing(field, name, samples, style, &scale, "");
+    let beside = DVec2::new(plot.size.x - RIGHT, TOP);
+    let bar = bar(&scale, style.quantity, beside, plot.size.y - TOP - BELOW);
+    let size = DVec2::new(bar.size.x, plot.size.y.max(bar.size.y));
+    Drawing { size, body: plot.body + &bar.body }.document(&format!("{name}, {} m", samples.plane))
 }
 
-/// The slice as a part of a document. `id` keeps the patterns of several apart.
-pub fn drawing(field: &dyn Field, name: &str, samples: &Samples, style: Style, id: &str) -> Drawing {
+/// The slice as a part of a document, without its colour bar. `id` keeps the patterns of several apart.
+pub fn drawing(
+    field: &dyn Field,
+    name: &str,
+    samples: &Samples,
+    style: Style,
+    scale: &Scale,
+    id: &str,
+) -> Drawing {
     let frame = PlotFrame::new(samples.window, DVec2::new(LEFT, TOP));
-    let scale = Scale::for_samples(samples);
-    let bar = Bar::new(&frame, &scale);
-    let width = frame.right() + BAR.iter().sum::<f64>() + bar.numbers + 8.0;
-    let height = frame.bottom().max(bar.bottom) + BELOW;
-
     let mut out = format!(
         r##"<text x="{LEFT}" y="{2}" font-size="16">{0}<tspan fill="#555" dx="9">{1} m</tspan></text>
 "##,
@@ -70,27 +79,34 @@ pub fn drawing(field: &dyn Field, name: &str, samples: &Samples, style: Style, i
         samples.plane,
         TOP - 16.0
     );
-    let labels = bands_and_lines(&mut out, field, samples, &frame, &scale);
+    let labels = bands_and_lines(&mut out, field, samples, &frame, scale);
     undefined_cells(&mut out, samples, &frame, id);
     if style.arrows {
-        arrows::draw(&mut out, field, samples.plane, &frame);
+        let labels: Vec<LevelLabel> = labels.iter().map(|(_, label)| label.clone()).collect();
+        arrows::draw(&mut out, field, samples.plane, &frame, &labels);
     }
-    // the halo of a number interrupts the arrow behind it
-    out += &labels;
+    numbers(&mut out, scale, &labels);
     axes::draw(&mut out, &frame, samples.plane);
-    bar.draw(&mut out, &scale, style.quantity);
-    Drawing { size: DVec2::new(width, height), body: out }
+    Drawing { size: DVec2::new(frame.right() + RIGHT, frame.bottom() + BELOW), body: out }
 }
 
-/// Draws the bands and their lines, and returns the numbers on these, which belong on top of all that is drawn in the
-/// plot.
+/// The colour bar of a scale beside a plot of a height, whose upper right corner is `at`.
+pub fn bar(scale: &Scale, quantity: Quantity, at: DVec2, height: f64) -> Drawing {
+    let bar = Bar::new(at, height, scale);
+    let mut body = String::new();
+    bar.draw(&mut body, scale, quantity);
+    let right = at.x + BAR.iter().sum::<f64>() + bar.numbers + 8.0;
+    Drawing { size: DVec2::new(right, (at.y + height).max(bar.bottom) + BELOW), body }
+}
+
+/// Draws the bands and their lines, and returns the numbers on these, each with the number of its level.
 fn bands_and_lines(
     out: &mut String,
     field: &dyn Field,
     samples: &Samples,
     frame: &PlotFrame,
     scale: &Scale,
-) -> String {
+) -> Vec<(usize, LevelLabel)> {
     let levels: Vec<Vec<Outline>> =
         scale.levels().iter().map(|&level| outlines(field, samples, level)).collect();
     let PlotFrame { origin, size, .. } = *frame;
@@ -138,32 +154,40 @@ fn bands_and_lines(
     labels(frame, scale, zero, &lines)
 }
 
-fn labels(frame: &PlotFrame, scale: &Scale, zero: usize, lines: &[Vec<(Vec<DVec2>, bool)>]) -> String {
+/// The numbers on the lines of all levels but zero.
+fn labels(
+    frame: &PlotFrame,
+    scale: &Scale,
+    zero: usize,
+    lines: &[Vec<(Vec<DVec2>, bool)>],
+) -> Vec<(usize, LevelLabel)> {
     let lines: Vec<Vec<Vec<DVec2>>> =
         lines.iter().map(|level| level.iter().map(|(points, _)| points.clone()).collect()).collect();
     let mut placer = Placer::new(frame, &lines);
-    let mut text = String::new();
-    for (k, level) in written(scale.decimals()).iter().enumerate().filter(|(k, _)| *k != zero) {
-        let Some(LevelLabel { at, angle, text: label }) = placer.place(k, level) else {
-            continue;
-        };
+    let texts = written(scale.decimals());
+    let others = texts.iter().enumerate().filter(|(k, _)| *k != zero);
+    others.filter_map(|(k, text)| Some((k, placer.place(k, text)?))).collect()
+}
+
+fn numbers(out: &mut String, scale: &Scale, labels: &[(usize, LevelLabel)]) {
+    if labels.is_empty() {
+        return;
+    }
+    let _ = writeln!(
+        out,
+        r#"<g font-size="10" font-weight="400" text-anchor="middle" paint-order="stroke" stroke-width="3.5" stroke-linejoin="round">"#
+    );
+    for (k, LevelLabel { at, angle, text }) in labels {
         // the halo has the colour of the ground, so the line seems to be interrupted
         let _ = writeln!(
-            text,
-            r#"<text transform="translate({:.2} {:.2}) rotate({angle:.1})" y="3.4" stroke="{}">{label}</text>"#,
+            out,
+            r#"<text transform="translate({:.2} {:.2}) rotate({angle:.1})" y="3.4" stroke="{}">{text}</text>"#,
             at.x,
             at.y,
-            hex(mean(scale.band_colour(k), scale.band_colour(k + 1)))
+            hex(mean(scale.band_colour(*k), scale.band_colour(k + 1)))
         );
     }
-    if text.is_empty() {
-        return text;
-    }
-    format!(
-        r#"<g font-size="10" font-weight="400" text-anchor="middle" paint-order="stroke" stroke-width="3.5" stroke-linejoin="round">
-{text}</g>
-"#
-    )
+    out.push_str("</g>\n");
 }
 
 /// Draws grey hatching over every cell with a corner that has no value. Cells side by side make
@@ -204,14 +228,14 @@ struct Bar {
 }
 
 impl Bar {
-    fn new(frame: &PlotFrame, scale: &Scale) -> Self {
+    fn new(at: DVec2, height: f64, scale: &Scale) -> Self {
         let bands = scale.bands() as f64;
-        let band = (frame.size.y / bands).clamp(BAND[1], BAND[0]).floor();
+        let band = (height / bands).clamp(BAND[1], BAND[0]).floor();
         // centred beside the plot, or from the plot's upper edge down if the plot is lower than the bar
-        let top = frame.origin.y + (0.5 * (frame.size.y - bands * band)).max(0.0).round();
+        let top = at.y + (0.5 * (height - bands * band)).max(0.0).round();
         let widest = written(scale.decimals()).iter().map(|level| level.chars().count()).max().unwrap_or(1);
         let numbers = NUMBERS[0] + NUMBERS[1] * widest as f64;
-        Self { left: frame.right() + BAR[0], band, bottom: top + bands * band, numbers }
+        Self { left: at.x + BAR[0], band, bottom: top + bands * band, numbers }
     }
 
     /// The lower border of a band.
