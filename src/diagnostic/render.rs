@@ -11,12 +11,17 @@ use super::{Diagnostic, Diagnostics, Label, Severity, Source, Span, is_hidden, p
 pub enum Style {
     /// ASCII decorations without escape codes, for logs, snapshots and error values.
     Plain,
+    /// As [`Style::Plain`], with quoted lines cut to the width of a panel beside a picture.
+    Panel,
     /// Escape codes and line drawing characters, for terminals.
     Terminal,
 }
 
 /// Lines longer than this, in bytes, are not quoted whole. A generated file may be one line of megabytes.
 const LONGEST_QUOTED_LINE: usize = 400;
+
+/// Columns of a panel beside a picture.
+const PANEL_COLUMNS: usize = 72;
 
 /// Messages longer than this, in bytes, lose their middle.
 const LONGEST_MESSAGE: usize = 400;
@@ -25,6 +30,7 @@ const LONGEST_MESSAGE: usize = 400;
 pub fn render(diagnostics: &Diagnostics, style: Style) -> String {
     let renderer = match style {
         Style::Plain => Renderer::plain(),
+        Style::Panel => Renderer::plain().term_width(PANEL_COLUMNS),
         Style::Terminal => Renderer::styled().decor_style(DecorStyle::Unicode),
     };
     let mut out = String::new();

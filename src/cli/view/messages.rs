@@ -5,7 +5,7 @@ use rfm::Error;
 use rfm::diagnostic::{Diagnostics, Style, render};
 
 pub(super) fn plain(diagnostics: &Diagnostics) -> String {
-    render(diagnostics, Style::Plain)
+    render(diagnostics, Style::Panel)
 }
 
 pub(super) fn refused(error: Error) -> String {

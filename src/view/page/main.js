@@ -151,8 +151,12 @@ class Viewer {
 
   /** Shows an error over the last good picture; nothing if there is none. */
   notice(text) {
+    if (text === this.noticed) return;
+    this.noticed = text;
     byId("notice").hidden = !text;
-    byId("notice").textContent = text ?? "";
+    // a quoted line stands whole over its marks, everything else breaks where it is too long
+    const lines = (text ?? "").trimEnd().split("\n").map((line) => (/^ *\d* *\|/.test(line) ? element("span", { className: "quoted" }, line) : line));
+    byId("notice").replaceChildren(...lines.flatMap((line) => [line, "\n"]).slice(0, -1));
   }
 
   send(command) {

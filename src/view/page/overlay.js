@@ -18,15 +18,26 @@ function drawOverlay(context, size, ratio, look, camera, seen, caption) {
   if (look.arrows && look.velocity && look.legend) {
     context.fillStyle = look.colours.soft;
     context.textAlign = "left";
-    context.fillText(`arrows: way in ${shown(look.arrowSeconds)} s`, left, bottom);
+    write(context, look, `arrows: way in ${shown(look.arrowSeconds)} s`, left, bottom);
     bottom -= 18;
   }
   if (look.slice) drawSliceLegend(context, look, look.slice, [left, bottom], height);
   if (caption) {
     context.fillStyle = look.colours.text;
     context.textAlign = "left";
-    caption.forEach((line, i) => context.fillText(line, 14, 22 + 18 * i));
+    caption.forEach((line, i) => write(context, look, line, 14, 22 + 18 * i));
   }
+}
+
+/** Writes a text with a border in the colour of the paper, so that it can be read over lines. */
+function write(context, look, text, x, y) {
+  context.save();
+  context.lineJoin = "round";
+  context.lineWidth = 3.5;
+  context.strokeStyle = `rgb(${look.colours.back.map((c) => 255 * c).join()})`;
+  context.strokeText(text, x, y);
+  context.restore();
+  context.fillText(text, x, y);
 }
 
 /** The height of a legend below the title; 0 where there is no room for one. */
@@ -62,7 +73,7 @@ function drawLegend(context, page, look, height) {
   context.fillStyle = look.colours.text;
   context.textAlign = "left";
   const { name, unit } = look.legend;
-  context.fillText(unit ? `${name}, ${unit}` : name, left, top - 14);
+  write(context, look, unit ? `${name}, ${unit}` : name, left, top - 14);
   const marks = ticks(low, high, height > 120 ? 5 : 3);
   for (const tick of marks) {
     const y = top + height * (1 - (high > low ? (tick - low) / (high - low) : 0));
@@ -70,7 +81,7 @@ function drawLegend(context, page, look, height) {
     context.moveTo(left + width, y);
     context.lineTo(left + width + 4, y);
     context.stroke();
-    context.fillText(shownBy(tick, marks.length > 1 ? marks[1] - marks[0] : 0, 4), left + width + 8, y);
+    write(context, look, shownBy(tick, marks.length > 1 ? marks[1] - marks[0] : 0, 4), left + width + 8, y);
   }
 }
 
@@ -104,7 +115,7 @@ function drawLengths(context, page, look, seen) {
     const edge = edges[0];
     if (!edge || Math.hypot(edge.p[0] - edge.q[0], edge.p[1] - edge.q[1]) < 60) continue;
     const out = unit([(edge.p[0] + edge.q[0]) / 2 - middle[0], (edge.p[1] + edge.q[1]) / 2 - middle[1], 0]);
-    const label = (p, text) => context.fillText(text, p[0] + out[0] * 17, p[1] + out[1] * 13);
+    const label = (p, text) => write(context, look, text, p[0] + out[0] * 17, p[1] + out[1] * 13);
     const along = (t) => [edge.p[0] + (edge.q[0] - edge.p[0]) * t, edge.p[1] + (edge.q[1] - edge.p[1]) * t];
     // what rounding has left of 0 is 0
     const rounded = (x) => (Math.abs(x) < 1e-9 * (max[axis] - min[axis]) ? 0 : x);
@@ -133,6 +144,6 @@ function drawAxes(context, page, look, camera, seen) {
     context.moveTo(x, y);
     context.lineTo(ex, ey);
     context.stroke();
-    context.fillText(text, x + d[0] * (length + 10), y - d[1] * (length + 10));
+    write(context, look, text, x + d[0] * (length + 10), y - d[1] * (length + 10));
   }
 }

@@ -29,20 +29,38 @@ uniform float levels[${MOST_LEVELS}];
 uniform vec3 bands[${MOST_LEVELS + 1}];
 out vec4 colour;
 float node(vec2 k) { return texelFetch(omega, ivec2(k), 0).r; }
+vec2 cell(vec2 p) { return clamp(floor(p), vec2(0.0), size - 2.0); }
+vec4 around(vec2 k) { return vec4(node(k), node(k + vec2(1.0, 0.0)), node(k + vec2(0.0, 1.0)), node(k + vec2(1.0, 1.0))); }
+float between(vec4 corners, vec2 f) { return mix(mix(corners.x, corners.y, f.x), mix(corners.z, corners.w, f.x), f.y); }
 void main() {
-  vec2 k = clamp(floor(place), vec2(0.0), size - 2.0), f = place - k;
-  vec4 corners = vec4(node(k), node(k + vec2(1.0, 0.0)), node(k + vec2(0.0, 1.0)), node(k + vec2(1.0, 1.0)));
-  float w = mix(mix(corners.x, corners.y, f.x), mix(corners.z, corners.w, f.x), f.y);
-  float rise = max(length(vec2(dFdx(w), dFdy(w))), 1e-30);
+  vec2 k = cell(place), f = place - k;
+  vec4 corners = around(k);
+  float w = between(corners, f);
+  // by how much it changes from pixel to pixel, within this cell alone: neighbours may lie behind a kink
+  vec2 slope = vec2(mix(corners.y - corners.x, corners.w - corners.z, f.y), mix(corners.z - corners.x, corners.w - corners.y, f.x));
+  vec2 right = dFdx(place), up = dFdy(place);
+  float rise = max(length(vec2(dot(slope, right), dot(slope, up))), 1e-30);
   // 3e38 stands for what is no number
   if (any(greaterThan(corners, vec4(2e38)))) { colour = vec4(vec3(0.84), 0.9); return; }
   int band = 0;
   float line = 0.0;
+  vec2 reached = vec2(1.0, -1.0);
   for (int i = 0; i < ${MOST_LEVELS}; i++) {
     if (i >= count) break;
     if (levels[i] <= w) band = i + 1;
     // half a pixel beside a line it fades
-    line = max(line, clamp((i == zero ? 1.7 : 0.9) - abs(w - levels[i]) / rise, 0.0, 1.0) * (i == zero ? 1.0 : 0.5));
+    float here = clamp((i == zero ? 1.7 : 0.9) - abs(w - levels[i]) / rise, 0.0, 1.0) * (i == zero ? 1.0 : 0.5);
+    if (here <= line) continue;
+    // where slopes of a formula differ much a value is not reached although it seems near
+    if (reached.x > reached.y) {
+      reached = vec2(w);
+      for (int n = 0; n < 8; n++) {
+        vec2 p = place + 2.0 * (cos(float(n) * 0.785398) * right + sin(float(n) * 0.785398) * up), c = cell(p);
+        float there = between(around(c), clamp(p - c, 0.0, 1.0));
+        reached = vec2(min(reached.x, there), max(reached.y, there));
+      }
+    }
+    if (reached.x <= levels[i] && levels[i] <= reached.y) line = here;
   }
   float opacity = max(w >= 0.0 ? 0.96 : 0.62, line);
   colour = vec4(mix(bands[band], vec3(0.1), line) * opacity, opacity);
@@ -119,7 +137,11 @@ class SliceView {
     gl.bindVertexArray(this.array);
     gl.enable(gl.BLEND);
     gl.blendFunc(gl.ONE, gl.ONE_MINUS_SRC_ALPHA);
+    // where the scene is cut open there, its section lies in the same plane
+    gl.enable(gl.POLYGON_OFFSET_FILL);
+    gl.polygonOffset(-1, -16);
     gl.drawArrays(gl.TRIANGLE_STRIP, 0, 4);
+    gl.disable(gl.POLYGON_OFFSET_FILL);
     gl.disable(gl.BLEND);
   }
 }
@@ -138,7 +160,7 @@ function drawSliceLegend(context, look, slice, [left, bottom], height) {
   context.strokeRect(left - 0.5, top - 0.5, 15, rows * row + 1);
   context.fillStyle = look.colours.text;
   context.textAlign = "left";
-  context.fillText(`ω at ${"xyz"[slice.axis]} = ${shown(slice.at)} m`, left, top - 14);
+  write(context, look, `ω at ${"xyz"[slice.axis]} = ${shown(slice.at)} m`, left, top - 14);
   const every = Math.ceil(12 / row);
   const zero = slice.levels.indexOf(0);
   slice.levels.forEach((level, k) => {
@@ -149,7 +171,7 @@ function drawSliceLegend(context, look, slice, [left, bottom], height) {
     context.lineTo(left + 18, y);
     context.stroke();
     // the surface always has its number
-    if ((k - zero) % every === 0) context.fillText(shown(level), left + 22, y);
+    if ((k - zero) % every === 0) write(context, look, shown(level), left + 22, y);
   });
   context.lineWidth = 1;
 }
