@@ -115,11 +115,11 @@ fn save(shared: &Shared, run: &SavedRun, target: &Path) -> Result<(), Failure> {
 
 fn serve(shared: &Shared, options: &View, content: Content) -> Result<(), Failure> {
     let server = Server::bind(&options.host, options.port)?;
-    let address = server.address();
+    let (address, told) = (server.address(), server.told_address());
     if shared.json {
-        output::json(&serde_json::json!({ "schema": 1, "address": address }))?;
+        output::json(&serde_json::json!({ "schema": 1, "address": told }))?;
     } else {
-        say!("{address}");
+        say!("{told}");
     }
     if server.is_open_to_others() {
         note(
