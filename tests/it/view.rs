@@ -244,12 +244,17 @@ fn what_cannot_be_viewed_is_said() {
     let here = folder.path();
     scene(here);
     std::fs::create_dir(here.join("empty")).unwrap();
+    let (_, scene) = SCENE.split_once("scene drop").unwrap();
+    std::fs::write(here.join("two.rfm"), format!("{SCENE}scene other{scene}")).unwrap();
     for (arguments, words) in [
         (&["view", "drop.rfm", "--save", "a.html"][..], "rfm run drop.rfm"),
         (&["view", "empty", "--save", "a.html"], "there are no frames in `empty`"),
         (&["view", "none.rfm", "--no-open"], "cannot read `none.rfm`"),
         (&["view", "-"], "standard input cannot be viewed"),
         (&["view", "drop.rfm", "--host", "256.1.1.1", "--no-open"], "cannot serve at --host 256.1.1.1"),
+        (&["view", "drop.rfm", "--scene", "drip", "--no-open"], "no scene `drip`; did you mean `drop`?"),
+        (&["view", "drop.rfm", "-s", "pots", "--no-open"], "no solid `pots`; did you mean `post`?"),
+        (&["view", "two.rfm", "--no-open"], "several scenes; choose one with --scene: drop, other"),
     ] {
         let outcome = rfm(here, arguments).expect(2);
         assert!(outcome.stderr.contains(words), "{arguments:?}: {}", outcome.stderr);
@@ -269,7 +274,7 @@ struct Viewer {
     at: SocketAddr,
     /// `/TOKEN/`
     path: String,
-    _folder: tempfile::TempDir,
+    folder: tempfile::TempDir,
 }
 
 impl Viewer {
@@ -288,7 +293,7 @@ impl Viewer {
         let address = line.trim().strip_prefix("http://").unwrap();
         let (at, token) = address.split_once('/').unwrap();
         assert_eq!(token.len(), 33, "{line}");
-        Self { child, at: at.parse().unwrap(), path: format!("/{token}"), _folder: folder }
+        Self { child, at: at.parse().unwrap(), path: format!("/{token}"), folder }
     }
 
     /// Sends bytes, and returns the first line of the answer and the whole.
@@ -454,14 +459,32 @@ fn a_page_follows_the_run_and_commands_it() {
         }
     }
     page.send(Message::text(r#"{"do":"set","name":"r","value":7}"#)).unwrap();
+    // the page hears of the last good value, and an edit of the file is shown
+    let radius = |setting: &serde_json::Value| setting["params"][0]["value"].as_f64();
+    let before = until(&mut page, "setting");
+    assert_eq!(radius(&before), Some(0.3));
     let error = loop {
         if let Some(error) = until(&mut page, "status")["error"].as_str() {
             break error.to_string();
         }
     };
     assert!(error.contains("`r`") && error.contains("0.4"), "{error}");
-    page.send(Message::text(r#"{"do":"reset"}"#)).unwrap();
+    let file = viewer.folder.path().join("drop.rfm");
+    let text = std::fs::read_to_string(&file).unwrap();
+    std::fs::write(&file, text.replace("particles: 800", "particles: 700")).unwrap();
+    while until(&mut page, "setting")["facts"] == before["facts"] {}
     while !until(&mut page, "status")["error"].is_null() {}
+    // a value that the edited file does not allow any more is that of the file
+    page.send(Message::text(r#"{"do":"set","name":"r","value":0.35}"#)).unwrap();
+    while radius(&until(&mut page, "setting")) != Some(0.35) {}
+    std::fs::write(&file, text.replace("0.4", "0.3")).unwrap();
+    while radius(&until(&mut page, "setting")) == Some(0.35) {}
+    page.send(Message::text(r#"{"do":"set","name":"r","value":0.15}"#)).unwrap();
+    while radius(&until(&mut page, "setting")) != Some(0.15) {}
+    page.send(Message::text(r#"{"do":"unset","name":"r"}"#)).unwrap();
+    while radius(&until(&mut page, "setting")) == Some(0.15) {}
+    page.send(Message::text(r#"{"do":"reset"}"#)).unwrap();
+    until(&mut page, "setting");
 }
 
 #[test]

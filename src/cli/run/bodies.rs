@@ -9,7 +9,7 @@ use super::super::hidden::hidden;
 use super::super::mesh::{LEAST_SEARCH, no_grid};
 use super::super::{Failure, note};
 use rfm::geom::{Aabb, Placement};
-use rfm::mesh::{self, Grid, Mesh, Resolution, Unwatched, dual_contouring};
+use rfm::mesh::{self, Grid, Mesh, MeshError, Resolution, Unwatched, Watch, dual_contouring, marching_cubes};
 use rfm::{Experiment, Solid};
 
 /// Bodies that are smaller than this part of the box are drawn as nothing.
@@ -79,15 +79,30 @@ impl Bodies {
 
     /// The mesh of each solid at a time, s, cut off at the box.
     pub fn meshes_at(&self, time: f64) -> Result<Vec<Mesh>, Failure> {
+        Ok(self.meshes_while(time, &Unwatched)?.unwrap_or_default())
+    }
+
+    /// [`Bodies::meshes_at`]; `None` if `watch` ends the work.
+    pub fn meshes_while(&self, time: f64, watch: &dyn Watch) -> Result<Option<Vec<Mesh>>, Failure> {
         let mesh_at = |(number, solid): (usize, &Solid)| {
             // where nothing moves, meshes are made once
             let carried = || Some((self.placement(number, time)?, self.at_start(number)?));
             match if self.move_about() { carried() } else { None } {
-                Some((placement, mesh)) => Ok(mesh.moved(&placement)),
-                None => self.mesh_of(&solid.at(time)),
+                Some((placement, mesh)) => Ok(Some(mesh.moved(&placement))),
+                None => self.mesh_of(&solid.at(time), watch),
             }
         };
         self.solids.iter().enumerate().map(mesh_at).collect()
+    }
+
+    /// Meshes at a time, s, whose edges are cut off: they are found in a part of the time of sharp ones.
+    pub fn rough_meshes_at(&self, time: f64) -> Result<Vec<Mesh>, Failure> {
+        let mesh_at = |solid: &Solid| {
+            let solid = solid.at(time);
+            let grid = self.grid(&solid)?;
+            marching_cubes(&*solid.surface(*grid.bounds()), &grid, &Unwatched).map_err(Failure::usage)
+        };
+        self.solids.iter().map(mesh_at).collect()
     }
 
     /// The meshes of the time 0 that all solids take along; `None` if one of them takes none.
@@ -105,7 +120,11 @@ impl Bodies {
         let make = || {
             let solid = self.solids[number].at(0.0);
             let is_whole = || solid.bounds().aabb().is_some_and(|bounds| self.holds(&bounds));
-            if !self.solids[number].moves() || is_whole() { self.mesh_of(&solid).ok() } else { None }
+            if !self.solids[number].moves() || is_whole() {
+                self.mesh_of(&solid, &Unwatched).ok().flatten()
+            } else {
+                None
+            }
         };
         self.carried[number].get_or_init(make).as_ref()
     }
@@ -129,10 +148,15 @@ impl Bodies {
         room.union(bounds) == room
     }
 
-    fn mesh_of(&self, solid: &Solid) -> Result<Mesh, Failure> {
+    /// The mesh of a solid; `None` if `watch` ends the work.
+    fn mesh_of(&self, solid: &Solid, watch: &dyn Watch) -> Result<Option<Mesh>, Failure> {
         let grid = self.grid(solid)?;
         let surface = solid.surface(*grid.bounds());
-        dual_contouring(&*surface, &grid, &Unwatched).map_err(Failure::usage)
+        match dual_contouring(&*surface, &grid, watch) {
+            Ok(mesh) => Ok(Some(mesh)),
+            Err(MeshError::Ended) => Ok(None),
+            Err(error) => Err(Failure::usage(error)),
+        }
     }
 
     fn grid(&self, solid: &Solid) -> Result<Grid, Failure> {

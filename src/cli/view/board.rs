@@ -113,6 +113,13 @@ impl Board {
         self.put(Topic::Setting, message);
     }
 
+    /// Sends the setting again, to pages whose fields have other values of params.
+    pub fn repeat_setting(&self) {
+        if let Some(setting) = self.setting() {
+            self.set_setting(setting);
+        }
+    }
+
     pub fn set_status(&self, status: &Status) {
         self.put(Topic::Status, told("status", status));
     }

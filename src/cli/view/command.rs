@@ -21,6 +21,8 @@ pub(super) enum Command {
     Try { name: String, value: f64 },
     /// Begin again with another value of a param.
     Set { name: String, value: f64 },
+    /// Begin again with the value that the file gives a param.
+    Unset { name: String },
     /// Show another solid of a file without a scene.
     Solid { name: String },
     /// Let gravity act in this direction from now on, m/s².
@@ -52,15 +54,37 @@ impl From<SliceAxis> for Axis {
     }
 }
 
+impl Command {
+    /// Whether it is about the run of the values that were set last, which may still be prepared.
+    pub fn needs_run(&self) -> bool {
+        match self {
+            Self::Play | Self::Pause | Self::Step | Self::Restart | Self::Solid { .. } => true,
+            Self::Reset
+            | Self::Try { .. }
+            | Self::Set { .. }
+            | Self::Unset { .. }
+            | Self::Gravity { .. }
+            | Self::Slice { .. }
+            | Self::Speed { .. }
+            | Self::Seen => false,
+        }
+    }
+}
+
 /// Leaves out commands that later ones undo: a slider sends many values, and only the last one counts.
 pub(super) fn settled(commands: Vec<Command>) -> Vec<Command> {
     let is_undone = |command: &Command, later: &[Command]| {
         later.iter().any(|other| match (command, other) {
             (
                 Command::Try { name, .. },
-                Command::Try { name: again, .. } | Command::Set { name: again, .. },
+                Command::Try { name: again, .. }
+                | Command::Set { name: again, .. }
+                | Command::Unset { name: again },
             )
-            | (Command::Set { name, .. }, Command::Set { name: again, .. }) => name == again,
+            | (
+                Command::Set { name, .. } | Command::Unset { name },
+                Command::Set { name: again, .. } | Command::Unset { name: again },
+            ) => name == again,
             (Command::Gravity { .. }, Command::Gravity { .. })
             | (Command::Slice { .. }, Command::Slice { .. })
             | (Command::Solid { .. }, Command::Solid { .. })
@@ -82,6 +106,7 @@ mod tests {
         assert_eq!(read(r#"{"do":"play"}"#), Some(Command::Play));
         let set = Command::Set { name: "cx".into(), value: 1.5 };
         assert_eq!(read(r#"{"do":"set","name":"cx","value":1.5}"#), Some(set));
+        assert_eq!(read(r#"{"do":"unset","name":"cx"}"#), Some(Command::Unset { name: "cx".into() }));
         let slice = Command::Slice { axis: Some(SliceAxis::Z), at: 0.25 };
         assert_eq!(read(r#"{"do":"slice","axis":"z","at":0.25}"#), Some(slice));
         for text in [
@@ -102,5 +127,8 @@ mod tests {
         let set = |name: &str, value| Command::Set { name: name.into(), value };
         let list = vec![tried(1.0), Command::Play, tried(2.0), set("b", 1.0), set("a", 3.0), Command::Play];
         assert_eq!(settled(list), [Command::Play, set("b", 1.0), set("a", 3.0), Command::Play]);
+        let unset = || Command::Unset { name: "a".into() };
+        assert_eq!(settled(vec![set("a", 1.0), unset()]), [unset()]);
+        assert_eq!(settled(vec![unset(), tried(1.0), set("a", 1.0)]), [set("a", 1.0)]);
     }
 }

@@ -242,9 +242,13 @@ fn poses(bodies: &Bodies, time: f64) -> Vec<[f64; 12]> {
 }
 
 /// The block of the mesh of all solids at a time, s.
-pub(super) fn mesh_at(bodies: &Bodies, time: f64, run: u64) -> Result<Vec<u8>, String> {
-    let meshes = bodies.meshes_at(time).map_err(message)?;
-    Ok(pack_mesh(&split_creases(&Mesh::joined(&meshes)), time, run))
+fn mesh_at(bodies: &Bodies, time: f64, run: u64) -> Result<Vec<u8>, String> {
+    Ok(packed(&bodies.meshes_at(time).map_err(message)?, time, run))
+}
+
+/// The block of the meshes of all solids at a time, s.
+pub(super) fn packed(meshes: &[Mesh], time: f64, run: u64) -> Vec<u8> {
+    pack_mesh(&split_creases(&Mesh::joined(meshes)), time, run)
 }
 
 impl Motion {

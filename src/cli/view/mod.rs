@@ -11,6 +11,7 @@
 //! | `server`, `request`, `stream` | the page and its stream at an address with a token |
 //! | `board` | the newest of everything that pages are told |
 //! | `session`, `model`, `course`, `command` | what goes on in time on its own thread, and what pages ask of it |
+//! | `mesher`, `making` | a mesh at once, and what takes longer on a thread of its own |
 //! | `messages` | what went wrong, as text |
 
 mod board;
@@ -19,6 +20,8 @@ mod command;
 mod course;
 mod exact;
 mod folder;
+mod making;
+mod mesher;
 mod messages;
 mod model;
 mod options;
@@ -39,6 +42,7 @@ use super::{input, output};
 use crate::cli::output::Shown;
 use board::Board;
 use folder::SavedRun;
+use model::Subject;
 pub(super) use options::View;
 use server::{Content, Server};
 use session::Session;
@@ -71,6 +75,8 @@ pub(super) fn run(shared: &Shared, options: &View) -> Result<(), Failure> {
     }
     // a file that cannot be read is an error here, one with mistakes is shown with them until it is mended
     drop(input::read(path)?);
+    // no change of the file makes up for what the command line lacks
+    Subject::new(shared, options).admit_choice()?;
     let board = Arc::new(Board::default());
     let commands = Session::start(shared, options, Arc::clone(&board))?;
     serve(shared, options, Content::Live { board, commands })

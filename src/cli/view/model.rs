@@ -5,10 +5,10 @@ use std::path::{Path, PathBuf};
 use std::time::SystemTime;
 
 use super::super::choose;
+use super::super::failure::Failure;
 use super::super::input;
-use super::super::run::bodies::Bodies;
 use super::super::shared::Shared;
-use super::course::{Course, Flow, Motion, mesh_at};
+use super::course::{Course, Flow, Motion};
 use super::messages::{message, plain, refused};
 use super::options::View;
 use super::way::Way;
@@ -19,9 +19,10 @@ use rfm::geom::Aabb;
 use rfm::lower::{Gravity, Options, Scene};
 use rfm::quantity::Dimension;
 use rfm::view::{Array, Corners, Levels, Param, Setting, VELOCITY};
-use rfm::{Engine, Experiment, Program, Solid};
+use rfm::{Engine, Error, Experiment, Program, Solid};
 
 /// What is viewed, as the command line states it.
+#[derive(Clone)]
 pub(super) struct Subject {
     pub path: PathBuf,
     scene: Option<String>,
@@ -65,9 +66,6 @@ pub(super) enum Detail {
     /// It stays.
     Lasting,
 }
-
-/// Most cells along the longest side of a mesh that is shown while a slider moves.
-const PASSING_CELLS: usize = 40;
 
 /// What distinguishes one state of a file from another.
 pub(super) type Stamp = Option<Vec<Option<(SystemTime, u64)>>>;
@@ -120,6 +118,37 @@ impl Subject {
     /// # Errors
     /// The messages, as the command line shows them.
     pub fn checked(&self, values: &BTreeMap<String, f64>) -> Result<Checked, String> {
+        let program = self.program(values)?;
+        let scene = self.scene_of(&program).map_err(message)?.cloned();
+        Ok(Checked { program, scene, solid: self.solid.clone() })
+    }
+
+    /// Refuses a scene or solid of the command line that the file lacks, and a missing choice between scenes. A file
+    /// with mistakes is not refused: it is shown with them until it is mended.
+    ///
+    /// # Errors
+    /// [`Failure::Usage`].
+    pub fn admit_choice(&self) -> Result<(), Failure> {
+        let Ok(program) = self.program(&BTreeMap::new()) else { return Ok(()) };
+        let solids = &program.module().solids;
+        match &self.solid {
+            Some(name) if solids.iter().all(|solid| solid.name != *name) => {
+                let known = solids.iter().map(|solid| solid.name.clone()).collect();
+                Err(choose::usage(Error::UnknownName { kind: "solid", name: name.clone(), known }))
+            }
+            Some(_) => Ok(()),
+            None => self.scene_of(&program).map(|_| ()),
+        }
+    }
+
+    /// The scene that is simulated; `None` if only a solid is shown.
+    fn scene_of<'a>(&self, program: &'a Program) -> Result<Option<&'a Scene>, Failure> {
+        let has_scene = !program.module().scenes.is_empty();
+        let is_wanted = self.solid.is_none() && (has_scene || self.scene.is_some());
+        is_wanted.then(|| choose::scene(program, self.scene.as_deref())).transpose()
+    }
+
+    fn program(&self, values: &BTreeMap<String, f64>) -> Result<Program, String> {
         let source = input::read(&self.path).map_err(message)?;
         let mut overrides = self.define.clone();
         overrides.extend(values.iter().map(|(name, value)| (name.clone(), *value)));
@@ -134,46 +163,32 @@ impl Subject {
             files: self.files.clone(),
             ..Options::default()
         };
-        let program = Program::check(source, options).map_err(|diagnostics| plain(&diagnostics))?;
-        let has_scene = !program.module().scenes.is_empty();
-        let scene = if self.solid.is_none() && (has_scene || self.scene.is_some()) {
-            Some(choose::scene(&program, self.scene.as_deref()).map_err(message)?.clone())
-        } else {
-            None
-        };
-        Ok(Checked { program, scene, solid: self.solid.clone() })
+        Program::check(source, options).map_err(|diagnostics| plain(&diagnostics))
     }
 
-    /// All that stands in the fluid's way at the start, or the solid at a time, s, with the block of its
-    /// mesh. A solid whose way ends before that time is shown at its end.
+    /// All that stands in the fluid's way at the start, or the solid at a time, s. A solid whose way ends before that
+    /// time is shown at its end.
     ///
     /// # Errors
-    /// Why there is no mesh.
-    pub fn standing(
-        &self,
-        checked: &Checked,
-        detail: Detail,
-        time: f64,
-        run: u64,
-    ) -> Result<(Vec<u8>, Standing), String> {
-        let standing = match &checked.scene {
+    /// Why nothing can be shown.
+    pub fn standing(&self, checked: &Checked, time: f64) -> Result<Standing, String> {
+        match &checked.scene {
             Some(scene) => {
                 let solids = self.solids_of(checked, scene)?;
-                Standing { solids, domain: scene.domain, way: None, time: 0.0 }
+                Ok(Standing { solids, domain: scene.domain, way: None, time: 0.0 })
             }
             None => {
                 let solid = self.solid_of(checked)?;
                 let way = Way::of(&solid)?;
                 let time = time.clamp(way.start, way.end);
-                Standing { solids: vec![solid], domain: way.room, way: Some(way), time }
+                Ok(Standing { solids: vec![solid], domain: way.room, way: Some(way), time })
             }
-        };
-        let cells = match detail {
-            Detail::Passing => self.cells.min(PASSING_CELLS),
-            Detail::Lasting => self.cells,
-        };
-        let bodies = Bodies::of(standing.solids.clone(), standing.domain, cells);
-        Ok((mesh_at(&bodies, standing.time, run)?, standing))
+        }
+    }
+
+    /// Cells along the longest side of meshes that stay.
+    pub fn cells(&self) -> usize {
+        self.cells
     }
 
     /// The box in which a scene or a solid is shown.
@@ -278,6 +293,12 @@ impl Checked {
     /// Whether the file has a param of this name.
     pub fn has_param(&self, name: &str) -> bool {
         self.program.module().params.iter().any(|param| param.name == name)
+    }
+
+    /// Whether the file has a param of this name whose range has this value.
+    pub fn admits(&self, name: &str, value: f64) -> bool {
+        let param = self.program.module().params.iter().find(|param| param.name == name);
+        param.is_some_and(|param| param.range.is_none_or(|(low, high)| (low..=high).contains(&value)))
     }
 }
 

@@ -3,6 +3,8 @@
 //! Invariant: an error of the file leaves the last good run as it is; it is shown beside it until the file is
 //! mended.
 
+mod loading;
+
 use std::collections::BTreeMap;
 use std::sync::Arc;
 use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
@@ -16,7 +18,8 @@ use super::super::shared::Shared;
 use super::board::{Board, Status, Topic};
 use super::command::{Command, settled};
 use super::course::Course;
-use super::exact::Field;
+use super::making::Making;
+use super::mesher::Mesher;
 use super::model::{Checked, Detail, Stamp, Standing, Subject};
 use super::options::View;
 use super::section;
@@ -36,7 +39,7 @@ const PLOTS: Duration = Duration::from_millis(250);
 /// A file that is missing this many times in a row, every [`LOOK`], is gone.
 const MISSED: u32 = 4;
 
-/// Pause of a simulation that is ahead of the clock.
+/// Pause of a simulation that is ahead of the clock, and of one that waits for what another thread makes.
 const BREATH: Duration = Duration::from_millis(4);
 
 /// A file that is viewed.
@@ -45,6 +48,14 @@ pub(super) struct Session {
     board: Arc<Board>,
     /// Values of params that pages have set.
     values: BTreeMap<String, f64>,
+    /// Those of them with which the obstacles are shown, and those of the present run: values that the file refuses
+    /// give way to them.
+    shown_with: BTreeMap<String, f64>,
+    runs_with: BTreeMap<String, f64>,
+    mesher: Mesher,
+    /// The run that is being prepared, and that which is prepared next.
+    preparing: Option<Making<Prepared>>,
+    next: Option<(Checked, Aabb)>,
     stamp: Stamp,
     /// How often the file was not there when it was looked for.
     missed: u32,
@@ -61,6 +72,14 @@ pub(super) struct Session {
     pace: Pace,
     /// The number of the present run.
     run: u64,
+}
+
+/// A run that can begin, with the values of params and the box of its scene.
+struct Prepared {
+    checked: Checked,
+    bounds: Aabb,
+    values: BTreeMap<String, f64>,
+    course: Result<Option<Course>, String>,
 }
 
 /// How the simulated time follows the clock.
@@ -92,6 +111,11 @@ impl Session {
             subject: Subject::new(shared, options),
             board,
             values: BTreeMap::new(),
+            shown_with: BTreeMap::new(),
+            runs_with: BTreeMap::new(),
+            mesher: Mesher::new(),
+            preparing: None,
+            next: None,
             stamp: None,
             missed: 0,
             checked: None,
@@ -137,9 +161,11 @@ impl Session {
                 self.follow_clock();
             }
             waited = !is_watched;
-            let wait = match self.status.playing && is_watched {
+            let advances = self.status.playing && is_watched && self.preparing.is_none();
+            let wait = match advances {
                 true if self.is_ahead() => BREATH,
                 true => Duration::ZERO,
+                false if self.preparing.is_some() || self.mesher.is_busy() => BREATH,
                 false => LOOK,
             };
             let first = match commands.recv_timeout(wait) {
@@ -155,13 +181,17 @@ impl Session {
                 looked = Instant::now();
                 self.reload_if_changed();
             }
-            if self.status.playing && is_watched && !self.is_ahead() {
+            self.take_what_is_made();
+            if self.status.playing && is_watched && self.preparing.is_none() && !self.is_ahead() {
                 self.advance();
             }
         }
     }
 
     fn obey(&mut self, command: Command) {
+        if command.needs_run() {
+            self.await_run();
+        }
         match command {
             Command::Play => {
                 if self.course.as_ref().is_some_and(Course::has_ended) {
@@ -182,7 +212,8 @@ impl Session {
             Command::Restart => self.restart(),
             Command::Reset => {
                 self.values.clear();
-                self.load();
+                self.shown_with.clear();
+                self.begin_load();
             }
             Command::Try { name, value } if self.may_set(&name, value) => {
                 let mut values = self.values.clone();
@@ -191,8 +222,13 @@ impl Session {
             }
             Command::Set { name, value } if self.may_set(&name, value) => {
                 self.values.insert(name, value);
-                self.load();
+                self.begin_load();
             }
+            Command::Unset { name } => match self.values.remove(&name) {
+                Some(_) => self.begin_load(),
+                // the page has nothing in its field
+                None => self.board.repeat_setting(),
+            },
             // a page that has not yet heard of a change of the file
             Command::Try { .. } | Command::Set { .. } => {}
             Command::Solid { name } => {
@@ -257,87 +293,16 @@ impl Session {
         self.stamp = stamp;
         self.announce("reading the file");
         self.subject.forget();
+        self.mesher.forget();
         if let Ok(plain) = self.subject.checked(&BTreeMap::new()) {
-            self.values.retain(|name, _| plain.has_param(name));
+            self.values.retain(|name, value| plain.admits(name, *value));
+            if self.subject.checked(&self.values).is_err() {
+                // a file without mistakes is shown, whatever a page has set before
+                self.values.clear();
+            }
         }
-        self.load();
+        self.begin_load();
         self.tell();
-    }
-
-    /// Checks the file with values for params and shows its obstacles. `None` if that is not possible; the
-    /// reason is then reported.
-    fn show_mesh(&mut self, values: &BTreeMap<String, f64>, detail: Detail) -> Option<Checked> {
-        let began = Instant::now();
-        // a moving solid continues from where it is
-        let time = match &self.course {
-            Some(course @ Course::Solid(_)) => course.time(),
-            Some(Course::Fluid(_)) | None => 0.0,
-        };
-        let made = self.subject.checked(values).and_then(|checked| {
-            let made = self.subject.standing(&checked, detail, time, self.run)?;
-            Ok((checked, made))
-        });
-        match made {
-            Ok((checked, (mesh, standing))) => {
-                // it takes the place of what was carried along
-                self.board.clear(Topic::Carried);
-                self.board.set_block(Topic::Mesh, mesh);
-                self.pace.mesh.time = f64::NAN;
-                self.pace.carried = None;
-                self.status.error = None;
-                let time = standing.time;
-                self.standing = Some(standing);
-                self.show_slice(time);
-                self.status.latency =
-                    Some(format!("the obstacle followed in {:.0} ms", began.elapsed().as_secs_f64() * 1e3));
-                Some(checked)
-            }
-            Err(error) => {
-                self.status.error = Some(error);
-                None
-            }
-        }
-    }
-
-    /// Reads the file and begins a run; if that is not possible, the last one remains.
-    fn load(&mut self) {
-        // what was wrong may have been mended, and looking takes a while
-        self.status.error = None;
-        self.announce("compiling");
-        let values = self.values.clone();
-        let (Some(checked), Some(standing)) = (self.show_mesh(&values, Detail::Lasting), &self.standing)
-        else {
-            // a file that was never right has no picture that could remain
-            self.status.playing &= self.course.is_some();
-            return;
-        };
-        let bounds = standing.domain;
-        if self.values.is_empty() {
-            // no slider has moved it
-            self.status.latency = None;
-        }
-        self.board.set_field(&Field::of(&checked, &standing.solids));
-        let course = match &checked.scene {
-            Some(scene) => self.subject.start(&checked, scene).map(Some),
-            None => Ok(self.subject.motion(standing)),
-        };
-        match course {
-            Ok(course) => {
-                self.course = course;
-                self.checked = Some(checked);
-                self.begin(&bounds);
-            }
-            Err(error) => {
-                self.status.error = Some(error);
-                // the last run remains, and its obstacles with it
-                self.show_obstacles();
-                // its params must be within reach, so that they can be set otherwise
-                if self.checked.is_none() {
-                    self.board.set_setting(self.subject.setting(Some(&checked), &bounds, None));
-                    self.checked = Some(checked);
-                }
-            }
-        }
     }
 
     /// Begins the present experiment again.
@@ -505,6 +470,9 @@ impl Session {
 
     fn tell(&mut self) {
         let state = self.course.as_ref().map_or_else(String::new, |course| {
+            if self.preparing.is_some() {
+                return "the run is prepared".into();
+            }
             let doing = if self.status.playing { "running" } else { "paused" };
             format!("{doing}{}", course.details(self.pace.seconds_per_step))
         });

@@ -143,12 +143,12 @@ function scaleOf(param) {
 
 const inUnit = (param, value) => Number((value / param.factor).toPrecision(6));
 
-/** Shows the values of params in the controls that there are, but not in one that is being used. */
+/** Shows the values of params in the controls that there are, but not in a field in which somebody writes. */
 function showParams(params) {
   for (const param of params) {
     const { low, high, to } = scaleOf(param);
     const [number, track] = [byId(`value-${param.name}`), byId(`param-${param.name}`)];
-    if (number !== document.activeElement) number.value = inUnit(param, param.value);
+    if (number !== document.activeElement || !number.isWritten) number.value = inUnit(param, param.value);
     track.value = to(clamp(param.value, low, high));
   }
 }
@@ -169,7 +169,13 @@ function paramsGroup(viewer) {
       return clamp(Math.round(value / step) * step, low, high);
     };
     const number = element("input", { type: "number", step: "any", value: inUnit(param, param.value), ariaLabel: param.name, id: `value-${param.name}`,
-      onchange: (event) => { if (event.target.value !== "") tell("set", Number(event.target.value) * param.factor); } });
+      oninput: () => (number.isWritten = true),
+      // what the file refuses gives way to the last good value, and nothing to that of the file
+      onchange: () => {
+        number.isWritten = false;
+        if (number.value === "") viewer.send({ do: "unset", name: param.name });
+        else tell("set", Number(number.value) * param.factor);
+      } });
     const track = element("input", { type: "range", min: to(low), max: to(high), step: "any", value: to(clamp(param.value, low, high)), ariaLabel: `${param.name}, slider`, id: `param-${param.name}`,
       oninput: (event) => tell("try", rounded(from(Number(event.target.value)))),
       onchange: (event) => tell("set", rounded(from(Number(event.target.value)))) });

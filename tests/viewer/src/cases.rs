@@ -45,6 +45,8 @@ pub const ALL: &[(&str, Case)] = &[
     ("solids as GLSL have the numbers of `rfm eval`", shaders::shaders),
     ("a run is followed, stopped, stepped and begun again", live::live),
     ("the obstacle follows a slider", live::slider),
+    ("hundreds of posts follow a slider", live::posts),
+    ("a value that the file refuses gives way to the last good one", live::refused),
     ("the exact surface agrees with the mesh", exact::beside_the_mesh),
     ("the exact surface moves with time", exact::in_motion),
     ("the exact surface of what is thin, and a mesh where there is none", exact::thin),

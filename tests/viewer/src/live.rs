@@ -60,6 +60,71 @@ pub fn slider(room: &mut Room) {
     room.browser.wait_for("viewer.setting.params.find((p) => p.name === 'cx').value === 1.5");
 }
 
+/// 22 × 22 posts beside a fluid: a rough mesh follows at once, and the sharp one a little later.
+pub fn posts(room: &mut Room) {
+    let text = "rfm 1\nparam r = 0.03 in 0.01 .. 0.05\n\
+                solid posts = any i in 0..22 : any j in 0..22 : cylinder(r, 0.5).move([0.1*i + 0.1, 0.1*j + 0.1, 0])\n\
+                scene s {\n  box { min: [0, 0, 0], max: [2.3, 2.3, 1.5] }\n  obstacle { solid: posts }\n  \
+                fluid water { shape: ball([1.1, 1.1, 1], 0.3), particles: 3000, viscosity: 0.1 }\n  method: wcsph\n  \
+                run { until: 1 s, save_every: 0.05 s }\n}\n";
+    std::fs::write(room.folder.join("posts.rfm"), text).unwrap();
+    let viewer = Viewer::start(&room.folder, &["posts.rfm"]);
+    room.browser.open(&viewer.address);
+    room.browser.wait_for("window.viewer && viewer.meshes.length === 1 && viewer.timeline.frames.length > 3");
+    for radius in [0.0342, 0.02, 0.04] {
+        room.browser.eval("viewer.old = viewer.meshes[0]; viewer.told_run = viewer.run.number");
+        let began = Instant::now();
+        room.browser.eval(&format!(
+            "(() => {{ const track = document.getElementById('param-r'); track.value = {radius}; \
+             track.dispatchEvent(new Event('input')); track.dispatchEvent(new Event('change')); }})()"
+        ));
+        room.browser.wait_for("viewer.meshes[0] !== viewer.old");
+        let shown = began.elapsed();
+        let rough = room.browser.number("viewer.meshes[0].triangles");
+        room.browser.wait_for(&format!("viewer.meshes[0].triangles > {rough}"));
+        let sharp = began.elapsed();
+        room.browser.wait_for("viewer.run.number > viewer.told_run && viewer.timeline.frames.length > 3");
+        let said = room.browser.eval("document.getElementById('latency').textContent");
+        println!(
+            "  {:.0} ms, sharp after {:.0} ms: {said}",
+            shown.as_secs_f64() * 1e3,
+            sharp.as_secs_f64() * 1e3
+        );
+    }
+    room.shot("posts");
+}
+
+pub fn refused(room: &mut Room) {
+    let file = room.folder.join("refused.rfm");
+    let good =
+        std::fs::read_to_string(room.folder.join("pawn.rfm")).unwrap().replace("= 10000 in", "= 1000 in");
+    std::fs::write(&file, &good).unwrap();
+    let viewer = Viewer::start(&room.folder, &["refused.rfm"]);
+    room.browser.open(&viewer.address);
+    room.browser.wait_for("window.viewer && viewer.meshes.length === 1 && viewer.timeline.frames.length > 2");
+    let type_in = |room: &mut Room, text: &str| {
+        room.browser.eval(&format!(
+            "(() => {{ const field = document.getElementById('value-cx'); field.focus(); field.value = '{text}'; \
+             field.dispatchEvent(new Event('input')); field.dispatchEvent(new Event('change')); }})()"
+        ));
+    };
+    let value = "document.getElementById('value-cx').value";
+    type_in(room, "1.2");
+    room.browser.wait_for("viewer.setting.params[0].value === 1.2");
+    type_in(room, "9");
+    room.browser.wait_for(&format!("!document.getElementById('notice').hidden && {value} === '1.2'"));
+    room.shot("refused");
+    // an edit of the file is shown
+    std::fs::write(
+        &file,
+        good.replace("box      { min: [0, 0, 0], max: [3, 3, 3]", "box { min: [0, 0, 0], max: [3, 3, 4]"),
+    )
+    .unwrap();
+    room.browser.wait_for("document.getElementById('notice').hidden && viewer.setting.box.max[2] > 3.9");
+    type_in(room, "");
+    room.browser.wait_for(&format!("{value} === '1.5'"));
+}
+
 pub fn turned(room: &mut Room) {
     let viewer = Viewer::start(&room.folder, &["pawn.rfm", "-D", "particles=1000"]);
     room.browser.open(&viewer.address);
