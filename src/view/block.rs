@@ -186,8 +186,6 @@ pub enum MeshRole {
     Solids,
     /// Obstacles that are where frames say, besides others of one instant alone.
     Carried,
-    /// The surface of a fluid.
-    Fluid,
 }
 
 /// What the head of a mesh says.
@@ -221,7 +219,6 @@ pub fn pack_parts(parts: &[Mesh], role: MeshRole, time: f64, run: u64) -> Vec<u8
     let kind = match role {
         MeshRole::Solids => "mesh",
         MeshRole::Carried => "carried",
-        MeshRole::Fluid => "surface",
     };
     let head = Head { kind, count: mesh.positions.len(), follows: false, rest: &rest };
     let mut out = begin(&head);
@@ -229,12 +226,7 @@ pub fn pack_parts(parts: &[Mesh], role: MeshRole, time: f64, run: u64) -> Vec<u8
     for (lattice, vectors) in [(lattice, &mesh.positions), (unit, &mesh.normals)] {
         let sites: Vec<[u16; 3]> = vectors.iter().map(|v| lattice.site(*v)).collect();
         for axis in 0..3 {
-            let mut last = 0;
-            let differences: Vec<u16> = sites
-                .iter()
-                .map(|site| folded(site[axis].wrapping_sub(std::mem::replace(&mut last, site[axis]))))
-                .collect();
-            planes(&mut out, &differences);
+            planes(&mut out, &differences(sites.iter().map(|site| site[axis])));
         }
     }
     // corners are near each other, and the first of a triangle is near that of the triangle before
@@ -284,7 +276,7 @@ pub fn pack_slice(head: &SliceHead, omega: &[f64]) -> Vec<u8> {
     out
 }
 
-fn begin(head: &impl Serialize) -> Vec<u8> {
+pub(super) fn begin(head: &impl Serialize) -> Vec<u8> {
     // numbers, names and texts: all of it has a form in JSON
     let head = serde_json::to_vec(head).unwrap_or_default();
     let mut out = (head.len() as u32).to_le_bytes().to_vec();
@@ -297,8 +289,14 @@ fn folded(difference: u16) -> u16 {
     (difference << 1) ^ ((difference as i16 >> 15) as u16)
 }
 
+/// The differences of numbers from those before them.
+pub(super) fn differences(numbers: impl Iterator<Item = u16>) -> Vec<u16> {
+    let mut last = 0;
+    numbers.map(|now| folded(now.wrapping_sub(std::mem::replace(&mut last, now)))).collect()
+}
+
 /// The low bytes of all numbers, then the high ones.
-fn planes(out: &mut Vec<u8>, numbers: &[u16]) {
+pub(super) fn planes(out: &mut Vec<u8>, numbers: &[u16]) {
     out.extend(numbers.iter().map(|x| *x as u8));
     out.extend(numbers.iter().map(|x| (x >> 8) as u8));
 }

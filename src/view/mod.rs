@@ -18,6 +18,7 @@ mod levels;
 mod page;
 mod pose;
 mod setting;
+mod surface;
 
 pub use block::{
     Frame, FrameHead, MeshRole, Motion, SliceHead, pack_frame, pack_mesh, pack_parts, pack_slice,
@@ -27,3 +28,4 @@ pub use levels::{Lattice, Levels, UNKNOWN_LEVEL};
 pub use page::{Page, Sizes, document, solid};
 pub use pose::{columns, pose};
 pub use setting::{Array, Column, Corners, Param, Plot, Setting, VELOCITY};
+pub use surface::{pack_surface, reduced};

@@ -38,6 +38,7 @@ const PROGRAM: &[&str] = &[
 pub struct Page<'a> {
     out: &'a mut dyn Write,
     meshes: Group,
+    surfaces: Group,
     frames: Group,
 }
 
@@ -53,8 +54,10 @@ struct Group {
 pub struct Sizes {
     /// Its frames.
     pub frames: u64,
-    /// Its meshes.
+    /// Its meshes of solids.
     pub meshes: u64,
+    /// Its surfaces of the fluid.
+    pub surfaces: u64,
 }
 
 /// Blocks that are written together have about this many bytes: browsers take milliseconds for each group,
@@ -74,7 +77,7 @@ impl<'a> Page<'a> {
         let json = serde_json::to_string(setting)?.replace('<', "\\u003c");
         out.write_all(json.as_bytes())?;
         out.write_all(b"</script>\n")?;
-        Ok(Self { out, meshes: Group::default(), frames: Group::default() })
+        Ok(Self { out, meshes: Group::default(), surfaces: Group::default(), frames: Group::default() })
     }
 
     /// Adds the block of a frame, deflated and as base64, together with those around it if it is small.
@@ -88,6 +91,7 @@ impl<'a> Page<'a> {
         }
         // a frame needs the meshes that it names
         self.meshes.write(self.out)?;
+        self.surfaces.write(self.out)?;
         self.frames.write(self.out)
     }
 
@@ -100,16 +104,30 @@ impl<'a> Page<'a> {
         if self.meshes.waiting.len() >= GROUP { self.meshes.write(self.out) } else { Ok(()) }
     }
 
+    /// Adds the block of a surface of the fluid that later frames name, as [`Page::frame`] does.
+    ///
+    /// # Errors
+    /// Those of the stream, and blocks of 4 GiB and more.
+    pub fn surface(&mut self, block: &[u8]) -> io::Result<()> {
+        self.surfaces.add(block)?;
+        if self.surfaces.waiting.len() >= GROUP { self.surfaces.write(self.out) } else { Ok(()) }
+    }
+
     /// Ends the document.
     ///
     /// # Errors
     /// Those of the stream.
     pub fn end(mut self) -> io::Result<Sizes> {
         self.meshes.write(self.out)?;
+        self.surfaces.write(self.out)?;
         self.frames.write(self.out)?;
         let (_, tail) = parts();
         self.out.write_all(tail.replace("/*PROGRAM*/", &PROGRAM.concat()).as_bytes())?;
-        Ok(Sizes { frames: self.frames.written, meshes: self.meshes.written })
+        Ok(Sizes {
+            frames: self.frames.written,
+            meshes: self.meshes.written,
+            surfaces: self.surfaces.written,
+        })
     }
 }
 

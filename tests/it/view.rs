@@ -192,6 +192,11 @@ fn what_is_only_moved_has_one_mesh_and_surfaces_of_the_fluid_are_shown() {
     }
     rfm(here, &["mesh", "drop.out", "--fluid", "--frames", "3..6"]).expect(0);
     let with = saved("with.html");
+    for (surfaces, count) in [("none", 0), ("fine", 3)] {
+        rfm(here, &["view", "drop.out", "--save", "some.html", "--surfaces", surfaces]).expect(0);
+        let some = blocks(&std::fs::read_to_string(here.join("some.html")).unwrap());
+        assert_eq!(of(&some, "surface").len(), count, "{surfaces}");
+    }
     let surfaces: Vec<_> = of(&with, "frame").iter().map(|frame| frame["surface"].as_u64()).collect();
     let none = [None; 3];
     assert_eq!(surfaces, [&none[..], &[Some(0), Some(1), Some(2)], &[None; 5]].concat());

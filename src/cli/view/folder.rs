@@ -10,14 +10,14 @@ use super::super::output::counted;
 use super::super::saved::{self, RunFigures};
 use super::super::surfaces;
 use super::super::survey::{Survey, is_velocity};
-use super::options::View;
+use super::options::{Surfaces, View};
 use super::plots;
 use rfm::fluid_surface::{FrameEntry, read_arrays, read_mesh};
 use rfm::geom::Aabb;
 use rfm::mesh::{Mesh, split_creases};
 use rfm::view::{
     Array, Corners, Frame, FrameHead, Lattice, Levels, MeshRole, Motion, Page, Setting, Sizes, VELOCITY,
-    coarse, columns, pack_frame, pack_parts, pose,
+    coarse, columns, pack_frame, pack_parts, pack_surface, pose, reduced,
 };
 
 /// A run in its folder.
@@ -29,6 +29,7 @@ pub(super) struct SavedRun {
     mesh_of: Vec<Option<usize>>,
     /// For each frame the file of the fluid's surface, where there is one.
     surfaces: Vec<Option<PathBuf>>,
+    is_fine: bool,
     /// Name and range of each array of a page: the numbers at particles, then the components of the velocity.
     arrays: Vec<(String, Levels)>,
     /// The number of particles of all frames together.
@@ -46,7 +47,10 @@ impl SavedRun {
         let figures = RunFigures::read(&folder.join("summary.json")).ok();
         let survey = Survey::of(folder, &entries)?;
         let (meshes, mesh_of) = saved::obstacles(folder, &entries)?;
-        let surfaces = surfaces::there_are(folder, &entries)?;
+        let surfaces = match options.surfaces {
+            Surfaces::None => vec![None; entries.len()],
+            Surfaces::Small | Surfaces::Fine => surfaces::there_are(folder, &entries)?,
+        };
         let domain = survey.domain(figures.as_ref());
         let mut arrays = survey.arrays.clone();
         let velocity = survey.velocity.into_iter();
@@ -68,7 +72,8 @@ impl SavedRun {
             plots: Some(plots::saved(folder)),
         };
         let (folder, particles) = (folder.to_path_buf(), survey.particles);
-        Ok(Self { folder, entries, meshes, mesh_of, surfaces, arrays, particles, setting, lattice })
+        let is_fine = options.surfaces == Surfaces::Fine;
+        Ok(Self { folder, entries, meshes, mesh_of, surfaces, is_fine, arrays, particles, setting, lattice })
     }
 
     pub fn frames(&self) -> usize {
@@ -80,7 +85,7 @@ impl SavedRun {
         self.particles
     }
 
-    /// Writes the page. Surfaces of the fluid have the detail of half the particles' spacing in it.
+    /// Writes the page.
     pub fn write(&self, out: &mut dyn Write) -> io::Result<Sizes> {
         let mut page = Page::begin(out, &self.setting)?;
         let (mut meshes, mut surfaces) = (Meshes::default(), 0);
@@ -90,17 +95,22 @@ impl SavedRun {
             if let Some(block) = meshes.next(file, entry.time)? {
                 page.mesh(&block)?;
             }
+            let frame = self.frame(entry)?;
             let surface = match &self.surfaces[k] {
                 Some(file) => {
                     let mesh = read_mesh(&std::fs::read(file)?).map_err(io::Error::other)?;
-                    let mesh = coarse(&mesh, self.setting.radius);
-                    page.mesh(&pack_parts(&[mesh], MeshRole::Fluid, entry.time, 0))?;
+                    let radius = self.setting.radius;
+                    let (mesh, cell) = if self.is_fine {
+                        (coarse(&mesh, radius), radius)
+                    } else {
+                        reduced(&mesh, 2.0 * radius, frame.sites.len())
+                    };
+                    page.surface(&pack_surface(&mesh, cell, entry.time))?;
                     surfaces += 1;
                     Some(surfaces - 1)
                 }
                 None => None,
             };
-            let frame = self.frame(entry)?;
             let head = FrameHead {
                 time: entry.time,
                 step: None,

@@ -104,17 +104,24 @@ fn save(shared: &Shared, run: &SavedRun, target: &Path) -> Result<(), Failure> {
         return output::json(&serde_json::json!({
             "schema": 1, "file": target.display().to_string(), "frames": frames, "bytes": bytes,
             "bytes_of_frames": sizes.map(|sizes| sizes.frames), "bytes_of_meshes": sizes.map(|sizes| sizes.meshes),
+            "bytes_of_surfaces": sizes.map(|sizes| sizes.surfaces),
             "bytes_per_particle_and_frame": bytes as f64 / particles.max(1) as f64,
         }));
     }
+    let per_particle = |bytes: u64| bytes as f64 / particles.max(1) as f64;
     let split = sizes.map_or_else(String::new, |sizes| {
-        let per_particle = sizes.frames as f64 / particles.max(1) as f64;
-        format!(
-            ": {per_particle:.1} bytes per particle and frame, {:.2} MB of meshes",
-            sizes.meshes as f64 / 1e6
-        )
+        let mut parts = vec![format!("{:.1} for the particles", per_particle(sizes.frames))];
+        if sizes.surfaces > 0 {
+            parts.push(format!("{:.1} for the surfaces of the fluid", per_particle(sizes.surfaces)));
+        }
+        format!(", {}, and {:.2} MB of obstacles", parts.join(", "), sizes.meshes as f64 / 1e6)
     });
-    say!("{}, {:.2} MB{split}", output::counted(frames, "frame"), bytes as f64 / 1e6);
+    say!(
+        "{}, {:.2} MB: {:.1} bytes per particle and frame{split}",
+        output::counted(frames, "frame"),
+        bytes as f64 / 1e6,
+        per_particle(bytes)
+    );
     say!("written to {}: it opens in any browser, without a network", target.shown());
     Ok(())
 }

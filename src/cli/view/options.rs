@@ -2,9 +2,20 @@
 
 use std::path::PathBuf;
 
-use clap::Args;
+use clap::{Args, ValueEnum};
 
 use crate::cli::values::{Frames, count, frames};
+
+/// How a page shows surfaces of the fluid.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub(in crate::cli) enum Surfaces {
+    /// With so little detail that they take no more bytes than the particles
+    Small,
+    /// With details of half the spacing of the particles; they take several times as many bytes
+    Fine,
+    /// Not at all
+    None,
+}
 
 #[derive(Debug, Args)]
 #[command(after_help = "A run, while it is computed:  rfm view examples/pawn.rfm\n\
@@ -37,6 +48,9 @@ pub(in crate::cli) struct View {
     /// Only every n-th frame of a run
     #[arg(long, help_heading = "Runs", value_name = "N", default_value = "1", value_parser = count)]
     pub every: usize,
+    /// Surfaces of the fluid that `rfm mesh DIR --fluid` has made
+    #[arg(long, help_heading = "Runs", value_name = "DETAIL", default_value = "small")]
+    pub surfaces: Surfaces,
     /// Address to serve at; others than this machine's own let others connect, if they have the token
     #[arg(long, help_heading = "Server", value_name = "HOST", default_value = "127.0.0.1")]
     pub host: String,

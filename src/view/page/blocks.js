@@ -69,29 +69,52 @@ function frameOf(head, planes, before) {
   return { ...head, sites, levels };
 }
 
+/** Vectors between two corners of a box. */
+function vectorsOf(planes, n, low, high) {
+  const out = new Float32Array(3 * n);
+  for (let axis = 0; axis < 3; axis++) {
+    const [lower, upper] = [planes.take(n), planes.take(n)];
+    const step = (high[axis] - low[axis]) / 65534;
+    for (let i = 0, site = 0; i < n; i++) {
+      site = (site + unfold(lower[i] | (upper[i] << 8))) & 65535;
+      out[3 * i + axis] = low[axis] + site * step;
+    }
+  }
+  return out;
+}
+
 /** A mesh: positions and normals as floats, corners as indices. */
 function meshOf(head, planes) {
   const n = head.count;
-  const vectors = (low, high) => {
-    const out = new Float32Array(3 * n);
-    for (let axis = 0; axis < 3; axis++) {
-      const [lower, upper] = [planes.take(n), planes.take(n)];
-      const step = (high[axis] - low[axis]) / 65534;
-      for (let i = 0, site = 0; i < n; i++) {
-        site = (site + unfold(lower[i] | (upper[i] << 8))) & 65535;
-        out[3 * i + axis] = low[axis] + site * step;
-      }
-    }
-    return out;
-  };
-  const positions = vectors(head.min, head.max);
-  const normals = vectors([-1, -1, -1], [1, 1, 1]);
+  const positions = vectorsOf(planes, n, head.min, head.max);
+  const normals = vectorsOf(planes, n, [-1, -1, -1], [1, 1, 1]);
   const m = 3 * head.triangles;
   const bytes = [0, 1, 2, 3].map(() => planes.take(m));
   const corners = new Uint32Array(m);
   for (let i = 0, corner = 0; i < m; i++) {
     corner = (corner + unfold((bytes[0][i] | (bytes[1][i] << 8) | (bytes[2][i] << 16) | (bytes[3][i] << 24)) >>> 0)) >>> 0;
     corners[i] = corner;
+  }
+  return { ...head, positions, normals, corners };
+}
+
+/** The surface of a fluid: a corner is new, or was new so many vertices ago. Its normals are those of its triangles. */
+function surfaceOf(head, planes) {
+  const positions = vectorsOf(planes, head.count, head.min, head.max);
+  const m = 3 * head.triangles;
+  const bytes = [0, 1, 2, 3].map(() => planes.take(m));
+  const corners = new Uint32Array(m);
+  for (let i = 0, next = 0; i < m; i++) {
+    const ago = bytes[0][i] | (bytes[1][i] << 8) | (bytes[2][i] << 16) | (bytes[3][i] << 24);
+    corners[i] = ago === 0 ? next++ : next - ago;
+  }
+  const normals = new Float32Array(3 * head.count);
+  for (let i = 0; i < m; i += 3) {
+    const [a, b, c] = [3 * corners[i], 3 * corners[i + 1], 3 * corners[i + 2]];
+    const [ux, uy, uz] = [positions[b] - positions[a], positions[b + 1] - positions[a + 1], positions[b + 2] - positions[a + 2]];
+    const [vx, vy, vz] = [positions[c] - positions[a], positions[c + 1] - positions[a + 1], positions[c + 2] - positions[a + 2]];
+    const [x, y, z] = [uy * vz - uz * vy, uz * vx - ux * vz, ux * vy - uy * vx];
+    for (const k of [a, b, c]) [normals[k], normals[k + 1], normals[k + 2]] = [normals[k] + x, normals[k + 1] + y, normals[k + 2] + z];
   }
   return { ...head, positions, normals, corners };
 }

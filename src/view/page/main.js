@@ -78,7 +78,7 @@ class Viewer {
       for (const block of blocksOf(await inflated(group.textContent))) {
         const [head, planes] = opened(block);
         if (head.kind === "mesh") this.meshes.push(meshOf(head, planes));
-        else if (head.kind === "surface") this.surfaces.push(meshOf(head, planes));
+        else if (head.kind === "surface") this.surfaces.push(surfaceOf(head, planes));
         else {
           before = frameOf(head, planes, before);
           this.timeline.add(before);

@@ -80,7 +80,7 @@ void main() {
   vec3 eye = parallel > 0.5 ? vec3(0.0, 0.0, 1.0) : normalize(-seen);
   if (!gl_FrontFacing) {
     // the inside of a solid that is cut open looks like the plane of the cut
-    if (opacity > 0.99) { colour = vec4(section, 1.0); return; }
+    if (opacity > 0.99 && dot(cut.xyz, cut.xyz) > 0.0) { colour = vec4(section, 1.0); return; }
     n = -n;
   }
   float rim = 1.0 - abs(dot(n, eye));
