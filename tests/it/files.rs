@@ -141,7 +141,7 @@ fn a_mistake_in_an_imported_file_is_shown_there_and_at_the_import() {
     let text = "rfm 1\nimport \"a.rfm\" as a\nsolid s = a.ball";
     for (other, words) in [
         ("rfm 1\nsolid ball = spere(1)\n", "did you mean `sphere`?"),
-        ("rfm 1\nsolid ball = sphere(\n", "unexpected end of the item"),
+        ("rfm 1\nsolid ball = sphere(\n", "`(` is not closed"),
         ("rfm 1\nsolid ball = sphere(-1)\n", "must be positive"),
     ] {
         let messages = check(text, &[("a.rfm", other)], &[]).unwrap_err();
