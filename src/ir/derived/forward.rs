@@ -220,8 +220,8 @@ mod tests {
             assert!((0..3).all(|i| (values[i] - values[i + 3]).abs() < 1e-15), "{values:?}");
             let around = Aabb::new(DVec3::splat(-0.5), DVec3::splat(1.0));
             let beside = Aabb::new(DVec3::new(1.0, -0.1, -0.1), DVec3::new(2.0, 0.1, 0.1));
-            for axis in 0..count {
-                let range = |over| RangeEvaluator::new(&graph, forward[axis]).eval(over);
+            for (axis, slope) in forward.into_iter().enumerate().take(count) {
+                let range = |over| RangeEvaluator::new(&graph, slope).eval(over);
                 let (any, some) = (range(&around), range(&beside));
                 assert!(any.lo >= -1.0 - 1e-15 && any.hi <= 1.0 + 1e-15, "{any:?}");
                 let expected = if axis == 0 { Interval::new(0.98, 1.0) } else { Interval::new(-0.1, 0.1) };
