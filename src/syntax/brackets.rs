@@ -1,5 +1,7 @@
 //! Brackets that a text opens and does not close, and where its code ends. Comments and quoted texts do not count.
 
+use super::code::CodeChars;
+
 /// An open bracket.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct Open {
@@ -22,18 +24,8 @@ pub(super) struct Brackets {
 impl Brackets {
     pub fn of(text: &str) -> Self {
         let mut found = Self::default();
-        let mut chars = text.char_indices();
-        while let Some((at, c)) = chars.next() {
-            let until = |stop: fn(char) -> bool, chars: &mut std::str::CharIndices<'_>| {
-                chars.find(|(_, c)| stop(*c)).map_or(text.len(), |(at, c)| at + c.len_utf8())
-            };
-            if c == '#' || text[at..].starts_with("//") {
-                until(|c| c == '\n', &mut chars);
-                continue;
-            }
-            let mut end = at + c.len_utf8();
+        for (at, c, end) in CodeChars::of(text) {
             match c {
-                '"' => end = until(|c| c == '"' || c == '\n', &mut chars),
                 '(' => found.open.push(Open { at, bracket: c, close: ')' }),
                 '[' => found.open.push(Open { at, bracket: c, close: ']' }),
                 '{' => found.open.push(Open { at, bracket: c, close: '}' }),

@@ -6,6 +6,7 @@
 pub mod ast;
 mod brackets;
 mod build;
+mod code;
 pub mod foreign;
 mod format;
 mod grammar;

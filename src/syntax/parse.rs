@@ -6,6 +6,7 @@ use pest::error::{Error, ErrorVariant, InputLocation};
 use super::ast::Ast;
 use super::brackets::Brackets;
 use super::build;
+use super::code::CodeChars;
 use super::foreign;
 use super::grammar::{Grammar, Rule};
 use super::slips::Slip;
@@ -259,31 +260,13 @@ impl Scan {
         let mut in_word = false;
         // true after an attribute, before the item that it belongs to
         let mut attributed = false;
-        let mut chars = text.char_indices();
-        while let Some((at, c)) = chars.next() {
-            let comment = c == '#' || text[at..].starts_with("//");
+        for (at, c, _) in CodeChars::of(text) {
             let word_starts = !in_word && (c.is_alphabetic() || c == '_');
             in_word = c.is_alphanumeric() || c == '_';
             match c {
                 '\n' => {
                     line_blank = true;
                     continue;
-                }
-                _ if comment => {
-                    for (_, c) in chars.by_ref() {
-                        if c == '\n' {
-                            break;
-                        }
-                    }
-                    line_blank = true;
-                    continue;
-                }
-                '"' => {
-                    for (_, c) in chars.by_ref() {
-                        if c == '"' || c == '\n' {
-                            break;
-                        }
-                    }
                 }
                 '@' if line_blank && nesting.braces == 0 => {
                     if !attributed {
