@@ -184,10 +184,11 @@ fn parts_of_length(rules: &[Rule], sum: Node) -> Option<Parts<Node>> {
 fn slopes_of_length(parts: &[(Interval, Slopes)]) -> Slopes {
     let mut sum = [ZERO; 3];
     for (k, &(part, slopes)) in parts.iter().enumerate().filter(|(_, (_, slopes))| *slopes != [ZERO; 3]) {
-        let others = parts.iter().enumerate().filter(|(other, _)| *other != k).map(|(_, (value, _))| *value);
-        let others = match parts.len() {
-            2 => others.fold(ZERO, |_, other| other),
-            _ => others.fold(ZERO, |sum, other| sum + other.square()).sqrt(),
+        let others: Parts<Interval> =
+            parts.iter().enumerate().filter(|(other, _)| *other != k).map(|(_, (value, _))| *value).collect();
+        let others = match others[..] {
+            [other] => other,
+            _ => others.iter().fold(ZERO, |sum, other| sum + other.square()).sqrt(),
         };
         let share = scaled(ONE - conjunction_weight(part, others), slopes);
         // a sum is rounded outwards, and zeros are to stay zeros

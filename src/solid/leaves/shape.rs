@@ -76,10 +76,17 @@ impl SlopeProgram {
         }
         let mut graph = shape.graph.clone();
         // what reverse mode does not know: which operand is chosen, and lengths that vanish
-        let needs_forward_mode = |expr: &Expr| {
-            let is_length = matches!(expr, Expr::Unary(Unary::Sqrt, _));
-            let (min, max) = ([Binary::Min, Binary::PlainMin], [Binary::Max, Binary::PlainMax]);
-            is_length || matches!(expr, Expr::Binary(op, ..) if min.contains(op) || max.contains(op))
+        let needs_forward_mode = |expr: &Expr| match expr {
+            Expr::Unary(Unary::Sqrt, _) => true,
+            Expr::Binary(op, ..) => {
+                matches!(op, Binary::Min | Binary::PlainMin | Binary::Max | Binary::PlainMax)
+            }
+            Expr::Unary(..)
+            | Expr::Constant(_)
+            | Expr::Coordinate(_)
+            | Expr::Parameter(_)
+            | Expr::Uniform(_)
+            | Expr::Lookup(..) => false,
         };
         let (graph, roots) = if graph.exprs().iter().any(needs_forward_mode) {
             let [x, y, z] = ir::forward_gradient(&mut graph, shape.root);

@@ -65,16 +65,13 @@ pub fn first_entry<'py>(
 fn doubles<'py>(given: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyAny>> {
     refuse_masked(given)?;
     let numpy = numpy(given.py())?;
-    let is_columns = match given.cast::<PyTuple>() {
-        Ok(parts) => parts.len() == 3 && parts.iter().all(|part| part.hasattr("ndim").unwrap_or(false)),
-        Err(_) => false,
-    };
-    let array = if is_columns {
-        let columns =
-            numpy.call_method1("broadcast_arrays", given.cast::<PyTuple>().map_err(PyErr::from)?.clone())?;
-        numpy.call_method1("stack", (columns, -1))?
-    } else {
-        numpy.call_method1("asarray", (given,))?
+    let is_array = |part: Bound<'_, PyAny>| part.hasattr("ndim").unwrap_or(false);
+    let array = match given.cast::<PyTuple>() {
+        Ok(columns) if columns.len() == 3 && columns.iter().all(is_array) => {
+            let columns = numpy.call_method1("broadcast_arrays", columns.clone())?;
+            numpy.call_method1("stack", (columns, -1))?
+        }
+        Ok(_) | Err(_) => numpy.call_method1("asarray", (given,))?,
     };
     let kind: String = array.getattr("dtype")?.getattr("kind")?.extract()?;
     if !["f", "i", "u", "b"].contains(&&*kind) {
