@@ -41,7 +41,7 @@ type Slot<P> = OnceLock<Result<P, CodegenError>>;
 const LARGE: usize = 1500;
 
 /// After so many single points they have cost what the program for them takes to be made, for a graph of up to
-/// [`HUGE`] nodes. A point costs a tenth with it: a block computes sixteen at least.
+/// [`HUGE`] nodes. A block computes sixteen points at least.
 const MANY_POINTS: u32 = 4096;
 
 /// What it takes grows faster than the graph: there are no programs for single points of larger ones.
@@ -278,4 +278,27 @@ fn guarded(graph: &mut Graph, root: Node, guard: Node, forms: &mut [Forms; 2]) -
         forms.iter_mut().zip(form).for_each(|(forms, form)| forms.set(below, other, form));
         graph.binary(op, below, other)
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::Program;
+    use glam::DVec3;
+
+    /// A large formula is answered by blocks at first and by a program for single points later, with the same bits.
+    #[test]
+    fn many_single_points_of_a_large_formula_have_the_bits_of_the_first() {
+        let text = "rfm 1\nsolid s = any i in 0..250: ball([0.3*i, random(1, i), 0], 0.2)";
+        let program = Program::from_source("t.rfm", text).unwrap();
+        let [auto, interpreted] =
+            [Engine::Auto, Engine::Interpreter].map(|engine| program.solid_with("s", engine).unwrap());
+        let at = |i: u32| DVec3::new(0.01 * f64::from(i), 0.3 + 1e-4 * f64::from(i), 0.1);
+        for i in 0..MANY_POINTS + 100 {
+            let found = auto.omega_grad(at(i));
+            if !(50..=MANY_POINTS).contains(&i) {
+                assert_eq!(found, interpreted.omega_grad(at(i)), "point {i}");
+            }
+        }
+    }
 }
