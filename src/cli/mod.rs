@@ -21,6 +21,7 @@ mod fmt;
 mod hidden;
 mod init;
 mod input;
+mod interrupt;
 mod language;
 mod lints;
 mod lsp;

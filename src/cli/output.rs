@@ -14,6 +14,7 @@ use rfm::diagnostic::{is_hidden, printable, printable_line};
 use rfm::sph::{Method, Parameters};
 
 use super::failure::{Failure, complain};
+use super::interrupt;
 
 /// Beginning of the names of temporary files. The name of the file that is written follows.
 pub(super) const TEMPORARY: &str = ".rfm-";
@@ -46,7 +47,8 @@ pub(super) fn write(path: &Path, fill: impl FnOnce(&mut dyn Write) -> io::Result
     let name = path.file_name().unwrap_or_default().to_string_lossy();
     let prefix = format!("{TEMPORARY}{name}-");
     remove_temporaries(folder);
-    let temporary = tempfile::Builder::new().prefix(&prefix).tempfile_in(folder).map_err(failed)?;
+    let made = interrupt::temporary(|| tempfile::Builder::new().prefix(&prefix).tempfile_in(folder));
+    let (_unfinished, temporary) = made.map_err(failed)?;
     // a folder that cannot be locked keeps what killed commands leave
     let _ = temporary.as_file().try_lock();
     let mut writer = BufWriter::new(temporary);
@@ -93,8 +95,8 @@ pub(super) fn through(path: &Path, fill: impl FnOnce(&Path) -> Result<(), Failur
     let name = to.file_name().unwrap_or_default().to_string_lossy();
     let ending = path.extension().map(|ending| format!(".{}", ending.to_string_lossy())).unwrap_or_default();
     let prefix = format!("{TEMPORARY}{name}-");
-    let temporary =
-        tempfile::Builder::new().prefix(&prefix).suffix(&ending).tempfile_in(folder).map_err(failed)?;
+    let make = || tempfile::Builder::new().prefix(&prefix).suffix(&ending).tempfile_in(folder);
+    let (_unfinished, temporary) = interrupt::temporary(make).map_err(failed)?;
     let _ = temporary.as_file().try_lock();
     fill(temporary.path())?;
     readable_by_others(temporary.as_file()).map_err(failed)?;

@@ -97,3 +97,58 @@ fn devices_pipes_and_links_stay_what_they_are() {
     let here_again = files(here);
     assert_eq!(here_again, ["drop.rfm", "link.stl", "null.stl", "part.stl", "pipe.stl"]);
 }
+
+/// Ctrl-C in the middle of a film: the command ends at once, and so does the program that encodes for it.
+#[cfg(unix)]
+#[test]
+fn an_interrupted_film_leaves_nothing() {
+    use std::os::unix::fs::PermissionsExt;
+    use std::process::{Command, Stdio};
+    use std::time::{Duration, Instant};
+    let folder = tempfile::tempdir().unwrap();
+    let here = folder.path();
+    std::fs::write(here.join("drop.rfm"), SMALL).unwrap();
+    rfm(here, &["run", "drop.rfm", "-o", "out", "--no-pictures"]).expect(0);
+    // one that takes all pictures and never ends by itself
+    let tool = here.join("tools/ffmpeg");
+    std::fs::create_dir(here.join("tools")).unwrap();
+    let script = format!(
+        "#!/bin/sh\n[ \"$1\" = -version ] && exit\necho $$ > {}\ncat > /dev/null\nexec sleep 60\n",
+        here.join("id").display()
+    );
+    std::fs::write(&tool, script).unwrap();
+    std::fs::set_permissions(&tool, std::fs::Permissions::from_mode(0o755)).unwrap();
+    let path = format!("{}:{}", here.join("tools").display(), std::env::var("PATH").unwrap());
+    std::fs::create_dir(here.join("films")).unwrap();
+    for name in ["a.gif", "a.mp4"] {
+        let arguments =
+            ["render", "out", "-o", &format!("films/{name}"), "--size", "8000x8000", "--threads", "1"];
+        let mut command = Command::new(env!("CARGO_BIN_EXE_rfm"));
+        command
+            .args(arguments)
+            .current_dir(here)
+            .env("PATH", &path)
+            .stdout(Stdio::null())
+            .stderr(Stdio::piped());
+        let child = command.spawn().unwrap();
+        let started = Instant::now();
+        let begun =
+            || !files(&here.join("films")).is_empty() && (name == "a.gif" || here.join("id").exists());
+        while !begun() {
+            assert!(started.elapsed() < Duration::from_secs(60), "{name} is not begun");
+            std::thread::sleep(Duration::from_millis(5));
+        }
+        let ended = |id: &str| {
+            !Command::new("kill").args(["-0", id]).stderr(Stdio::null()).status().unwrap().success()
+        };
+        assert!(Command::new("kill").args(["-INT", &child.id().to_string()]).status().unwrap().success());
+        let output = child.wait_with_output().unwrap();
+        let told = String::from_utf8(output.stderr).unwrap();
+        assert_eq!(output.status.code(), Some(130), "{name}: {told}");
+        assert!(told.contains("interrupted: what was half written is removed"), "{name}: {told}");
+        assert!(files(&here.join("films")).is_empty(), "{name}");
+        if name == "a.mp4" {
+            assert!(ended(std::fs::read_to_string(here.join("id")).unwrap().trim()), "the program goes on");
+        }
+    }
+}

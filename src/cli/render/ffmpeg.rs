@@ -2,15 +2,21 @@
 
 use std::io::{self, Read, Write};
 use std::path::Path;
-use std::process::{Child, ChildStdin, Command, Stdio};
+use std::process::{Child, ChildStdin, Command, ExitStatus, Stdio};
+use std::sync::{Arc, Mutex, PoisonError};
 use std::thread::JoinHandle;
+use std::time::Duration;
 
 use crate::cli::failure::Failure;
+use crate::cli::interrupt;
 use crate::cli::output::Shown;
 use rfm::diagnostic::printable_line;
 use rfm::render::Image;
 
 const PROGRAM: &str = "ffmpeg";
+
+/// Time between two looks whether the program has ended.
+const LOOK: Duration = Duration::from_millis(10);
 
 /// The least even width and height that hold a size: colours are stored for squares of four pixels.
 pub(super) fn even((width, height): (u32, u32)) -> (u32, u32) {
@@ -20,7 +26,9 @@ pub(super) fn even((width, height): (u32, u32)) -> (u32, u32) {
 /// A film that is being encoded.
 pub(super) struct Video {
     shown: String,
-    child: Child,
+    child: Arc<Mutex<Child>>,
+    /// While it lives Ctrl-C ends the program, too.
+    _unfinished: interrupt::Guard,
     pixels: Option<ChildStdin>,
     /// What the program complains of.
     complaint: Option<JoinHandle<String>>,
@@ -78,6 +86,9 @@ impl Video {
         command.args(codec).args(["-pix_fmt", "yuv420p", "-map_metadata", "-1", "-fflags", "+bitexact"]);
         command.arg("-flags:v").arg("+bitexact").arg(temporary);
         command.stdin(Stdio::piped()).stdout(Stdio::null()).stderr(Stdio::piped());
+        // Ctrl-C in a terminal is told to all programs of a group, and this one would end its file as if it were whole
+        #[cfg(unix)]
+        std::os::unix::process::CommandExt::process_group(&mut command, 0);
         let shown = path.shown();
         let mut child = command.spawn().map_err(|error| {
             Failure::usage(format!("cannot write `{shown}`: `{PROGRAM}` does not start: {error}"))
@@ -92,7 +103,19 @@ impl Video {
                 String::from_utf8_lossy(&text).into_owned()
             })
         });
-        Ok(Self { shown, child, pixels, complaint })
+        let (_unfinished, child) = interrupt::program(child);
+        Ok(Self { shown, child, _unfinished, pixels, complaint })
+    }
+
+    /// Waits for the end of the program, and leaves room for who would end it.
+    fn wait(&self) -> io::Result<ExitStatus> {
+        loop {
+            let ended = self.child.lock().unwrap_or_else(PoisonError::into_inner).try_wait()?;
+            match ended {
+                Some(status) => return Ok(status),
+                None => std::thread::sleep(LOOK),
+            }
+        }
     }
 
     /// Hands a picture to the program.
@@ -106,7 +129,7 @@ impl Video {
     /// Waits for the end of the file. `fed` says whether all pictures could be handed over.
     pub fn finish(mut self, fed: io::Result<()>) -> Result<(), Failure> {
         drop(self.pixels.take());
-        let status = self.child.wait()?;
+        let status = self.wait()?;
         let complaint = self.complaint.take().and_then(|thread| thread.join().ok()).unwrap_or_default();
         if status.success() && fed.is_ok() {
             return Ok(());
@@ -124,8 +147,9 @@ impl Video {
 impl Drop for Video {
     fn drop(&mut self) {
         drop(self.pixels.take());
+        let mut child = self.child.lock().unwrap_or_else(PoisonError::into_inner);
         // a program that has ended already needs no end
-        let _ = self.child.kill();
-        let _ = self.child.wait();
+        let _ = child.kill();
+        let _ = child.wait();
     }
 }

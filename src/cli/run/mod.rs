@@ -21,12 +21,11 @@ mod watch;
 
 use std::path::Path;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::{Arc, OnceLock};
 use std::time::Instant;
 
 use super::args::Run;
 use super::shared::Shared;
-use super::{Failure, choose, input, lints, note, output, progress};
+use super::{Failure, choose, input, interrupt, lints, note, output, progress};
 use crate::cli::output::Shown;
 use checkpoints::Checkpoints;
 use folder::Hold;
@@ -90,7 +89,7 @@ pub(super) fn run(shared: &Shared, options: &Run) -> Result<(), Failure> {
         experiment: &experiment,
     };
     let pace = Pace::new(&experiment, simulation.time());
-    let interrupted = interruption()?;
+    let interrupted = interrupt::of_runs()?;
     let end = recording.go_on(&mut simulation, goal, pace, &interrupted);
     let stopped = match end {
         Ok(end) => end.err(),
@@ -301,22 +300,4 @@ pub(super) fn run_in(folder: &Path) -> Option<String> {
 /// Whether a folder has a run that `--resume` can go on with.
 pub(super) fn has_checkpoint(folder: &Path) -> bool {
     checkpoints::exist(folder)
-}
-
-/// A flag that Ctrl-C sets. The run ends after the present step.
-fn interruption() -> Result<Arc<AtomicBool>, Failure> {
-    // there may be several runs in a process, and one handler
-    static FLAG: OnceLock<Arc<AtomicBool>> = OnceLock::new();
-    if let Some(flag) = FLAG.get() {
-        return Ok(Arc::clone(flag));
-    }
-    let flag = Arc::clone(FLAG.get_or_init(Arc::default));
-    let set = Arc::clone(&flag);
-    let handler = move || {
-        if set.swap(true, Ordering::Relaxed) {
-            std::process::exit(130); // the user pressed Ctrl-C twice
-        }
-    };
-    ctrlc::set_handler(handler).map_err(|e| Failure::usage(format!("cannot listen for Ctrl-C: {e}")))?;
-    Ok(flag)
 }
