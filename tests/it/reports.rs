@@ -243,3 +243,39 @@ fn a_report_says_which_run_failed() {
     let table: Vec<&str> = outcome.stdout.lines().collect();
     assert!(table.len() == 3 && table[2].contains("failed"), "{table:?}");
 }
+
+/// A plate so thin that coarse cells see nothing of it: what is not there has no figures.
+#[test]
+fn meshes_without_triangles_have_no_figures() {
+    let folder = tempfile::tempdir().unwrap();
+    let here = folder.path();
+    std::fs::write(here.join("plate.rfm"), "rfm 1\nsolid plate = box([0, 0, 0], [1.2345678, 1, 0.003])\n")
+        .unwrap();
+    let report = |flags: &[&str]| {
+        rfm(here, &[&["report", "plate.rfm", "--mesh-cells", "16"], flags].concat()).expect(0)
+    };
+    let document = report(&["--json"]).json();
+    let rows = document["meshes"].as_array().unwrap();
+    let empty: Vec<_> = rows.iter().filter(|row| row["triangles"] == 0).collect();
+    assert!(!empty.is_empty(), "{document}");
+    for row in &empty {
+        for figure in
+            ["hausdorff", "mesh_to_surface_rms", "volume_error", "normal_error_rms", "flipped", "order"]
+        {
+            assert!(
+                row.as_object().unwrap().contains_key(figure) && row[figure].is_null(),
+                "{figure}: {row}"
+            );
+        }
+    }
+    assert!(rows.iter().all(|row| row["triangles"] == 0 || row["hausdorff"].is_number()), "{document}");
+    let text = report(&["--html", "a.html"]).stdout;
+    assert!(text.contains("no triangles: mc with "), "{text}");
+    let line = text.lines().find(|line| line.starts_with("mc ")).unwrap();
+    assert!(!line.contains("0.00e0") && line.matches('–').count() >= 8, "{line}");
+    let page = std::fs::read_to_string(here.join("a.html")).unwrap();
+    assert!(page.contains("no triangles: mc with ") && page.contains("<td>–</td>"));
+    // numbers as a person reads them
+    let (about, _) = page.split_once("</p>").unwrap();
+    assert!(!about.contains("00000") && !about.contains("99999"), "{about}");
+}

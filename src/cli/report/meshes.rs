@@ -5,7 +5,8 @@ use std::path::Path;
 use std::time::{Duration, Instant};
 
 use anstream::println;
-use serde::Serialize;
+use serde::ser::Error as _;
+use serde::{Serialize, Serializer};
 
 use super::super::args::MeshMethod;
 use super::super::failure::{Failure, note};
@@ -40,7 +41,7 @@ pub(super) struct MeshFigures {
     closed: bool,
     manifold: bool,
     #[serde(flatten)]
-    quality: Quality,
+    quality: Measured,
     evaluations: u64,
     gradients: u64,
     milliseconds: f64,
@@ -48,6 +49,21 @@ pub(super) struct MeshFigures {
     order: Option<f64>,
     /// The order of the root mean square from the mesh to the surface.
     order_rms: Option<f64>,
+}
+
+/// The quality of a mesh. One without triangles has none, and its figures are null.
+#[derive(Debug, Clone, Copy)]
+struct Measured(Option<Quality>);
+
+impl Serialize for Measured {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        let Some(quality) = &self.0 else {
+            let names = serde_json::to_value(Quality::default()).map_err(S::Error::custom)?;
+            let names = names.as_object().into_iter().flat_map(serde_json::Map::keys);
+            return serializer.collect_map(names.map(|name| (name, None::<f64>)));
+        };
+        quality.serialize(serializer)
+    }
 }
 
 /// Meshes a solid by each method with up to `finest` cells. Empty for a solid without bounds.
@@ -64,8 +80,10 @@ pub(super) fn measure(solid: &Solid, finest: usize) -> Result<Vec<MeshFigures>, 
             bar.set_message(format!("{}, {cells} cells", method.name()));
             let mut row = row(solid, method, cells, &grid)?;
             if let Some(coarser) = rows.last().filter(|r| r.method == row.method && 2 * r.cells == cells) {
-                row.order = order(coarser.quality.hausdorff(), row.quality.hausdorff());
-                row.order_rms = order(coarser.quality.to_surface.rms, row.quality.to_surface.rms);
+                if let (Some(coarse), Some(fine)) = (coarser.quality.0, row.quality.0) {
+                    row.order = order(coarse.hausdorff(), fine.hausdorff());
+                    row.order_rms = order(coarse.to_surface.rms, fine.to_surface.rms);
+                }
             }
             rows.push(row);
             bar.inc(1);
@@ -101,6 +119,7 @@ fn row(solid: &Solid, method: MeshMethod, cells: usize, grid: &Grid) -> Result<M
     let report = mesh::check(&mesh, &*surface);
     let depth = solid.depth(*grid.bounds(), grid.spacing().max_element());
     let quality = mesh::measure(&mesh, &*surface, &*depth, grid).map_err(Failure::usage)?;
+    let quality = Measured((report.triangles > 0).then_some(quality));
     Ok(MeshFigures {
         method: method.name(),
         cells,
@@ -130,6 +149,25 @@ pub(super) fn print(rows: &[MeshFigures]) {
     for row in rows {
         println!("{}", table::line(&COLUMNS, &row.cells()));
     }
+    if let Some(lack) = without_triangles(rows) {
+        println!("{lack}");
+    }
+}
+
+/// Says which meshes have no triangles; `None` if all have some.
+pub(super) fn without_triangles(rows: &[MeshFigures]) -> Option<String> {
+    let of = |method: &str| {
+        let own = rows.iter().filter(|row| row.method == method && row.triangles == 0);
+        let cells: Vec<String> = own.map(|row| row.cells.to_string()).collect();
+        (!cells.is_empty()).then(|| format!("{method} with {} cells", cells.join(", ")))
+    };
+    let lacking: Vec<String> = ["mc", "dc"].into_iter().filter_map(of).collect();
+    (!lacking.is_empty()).then(|| {
+        format!(
+            "no triangles: {}; the mesh misses the whole solid, which is thinner than a cell, and has no figures",
+            lacking.join(", ")
+        )
+    })
 }
 
 /// What the table of meshes holds.
@@ -151,20 +189,20 @@ pub(super) const COLUMNS: [Column; 12] = [
 impl MeshFigures {
     /// The cells of [`COLUMNS`].
     pub fn cells(&self) -> Vec<String> {
-        let quality = &self.quality;
+        let figure = |shown: &dyn Fn(&Quality) -> String| self.quality.0.as_ref().map_or("–".into(), shown);
         vec![
             self.method.to_string(),
             self.cells.to_string(),
             self.triangles.to_string(),
             format!("{:.2}", self.milliseconds),
-            format!("{:.2e}", quality.hausdorff()),
+            figure(&|quality| format!("{:.2e}", quality.hausdorff())),
             table::order(self.order),
-            format!("{:.1e}", quality.to_surface.rms),
+            figure(&|quality| format!("{:.1e}", quality.to_surface.rms)),
             table::order(self.order_rms),
-            format!("{:+.1e}", quality.volume_error),
-            format!("{:.2}°", quality.normal_error.rms),
-            format!("{:.2} %", 100.0 * quality.slivers),
-            quality.flipped.to_string(),
+            figure(&|quality| format!("{:+.1e}", quality.volume_error)),
+            figure(&|quality| format!("{:.2}°", quality.normal_error.rms)),
+            figure(&|quality| format!("{:.2} %", 100.0 * quality.slivers)),
+            figure(&|quality| quality.flipped.to_string()),
         ]
     }
 }
@@ -173,7 +211,7 @@ impl MeshFigures {
 pub(super) fn draw(solid: &str, rows: &[MeshFigures], path: &Path) -> Result<Vec<u8>, Failure> {
     let marks: Vec<(&MeshFigures, f64)> = rows
         .iter()
-        .map(|row| (row, row.quality.hausdorff()))
+        .filter_map(|row| Some((row, row.quality.0?.hausdorff())))
         .filter(|(_, error)| *error > 0.0 && error.is_finite())
         .collect();
     let mut out = plot::begin(&format!("{solid}: error of its meshes"));
@@ -216,5 +254,9 @@ pub(super) fn draw(solid: &str, rows: &[MeshFigures], path: &Path) -> Result<Vec
     }
     legend.gap();
     legend.remark(&mut out, "numbers: time of meshing");
+    let empty = rows.iter().filter(|row| row.triangles == 0).count();
+    if empty > 0 {
+        legend.remark(&mut out, &format!("{empty} without triangles"));
+    }
     plot::end(out, path)
 }

@@ -18,6 +18,7 @@ mod solid_page;
 mod table;
 
 use anstream::println;
+use glam::DVec3;
 use serde::Serialize;
 
 use super::failure::Failure;
@@ -29,7 +30,7 @@ pub(super) use options::Report;
 use points::SamplePoints;
 use programs::{ExactValues, ProgramFigures};
 use rfm::codegen::target_description;
-use rfm::geom::Aabb;
+use rfm::geom::{Aabb, significant};
 use rfm::lower::Scene;
 use rfm::{Precision, Program, Solid};
 
@@ -172,10 +173,16 @@ fn about(points: &SamplePoints, over: Aabb) -> String {
     format!(
         "{} random points of {} … {}, {} points on the surface; one thread, medians; errors against 120 digits",
         points.random.len(),
-        over.min,
-        over.max,
+        corner(over.min),
+        corner(over.max),
         points.surface.len()
     )
+}
+
+/// A corner of a box as a person reads it.
+fn corner(p: DVec3) -> String {
+    let [x, y, z] = p.to_array().map(significant);
+    format!("[{x}, {y}, {z}]")
 }
 
 fn print(solid: &Solid, points: &SamplePoints, over: Aabb, rows: &[ProgramFigures]) {

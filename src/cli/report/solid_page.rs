@@ -9,7 +9,7 @@ use super::meshes::{self, MeshFigures};
 use super::page::{Figure, Page};
 use super::plot;
 use super::programs::{self, ProgramFigures};
-use rfm::geom::Aabb;
+use rfm::geom::{Aabb, significant};
 use rfm::mesh::Mesh;
 use rfm::render::{Camera, Legend};
 use rfm::slice::{self, Axis, Plane};
@@ -48,7 +48,10 @@ pub(super) fn made(
     if meshes.is_empty() {
         page.section("Meshes", "There are none: the solid has no bounds.");
     } else {
-        page.section("Meshes", meshes::ABOUT);
+        let lack = meshes::without_triangles(meshes);
+        let about =
+            lack.map_or_else(|| meshes::ABOUT.to_string(), |lack| format!("{}. {lack}", meshes::ABOUT));
+        page.section("Meshes", &about);
         let drawn = meshes::draw(name, meshes, Path::new(DRAWING))?;
         page.figures(&[Figure::svg(
             drawn,
@@ -83,7 +86,11 @@ fn pictures(solid: &Solid) -> Result<Vec<Figure>, Failure> {
         .map_err(Failure::usage)?;
     figures.push(Figure::svg(
         svg,
-        format!("ω of {name} in the plane {plane} m: above 0 inside, 0 on the surface"),
+        format!(
+            "ω of {name} in the plane {} = {} m: above 0 inside, 0 on the surface",
+            plane.axis.name(),
+            significant(plane.value)
+        ),
     ));
     Ok(figures)
 }
