@@ -163,7 +163,7 @@ pub const CAPTION_HEIGHT: f64 = 44.0;
 /// The time, the step and the number of particles where there are any, in columns that stay in place while
 /// the numbers change.
 pub fn caption(moment: &Caption, particles: usize, scale: f64) -> Result<Layer, RenderError> {
-    let mut words = vec![format!("t = {:.*} s", digits_of_time(moment.every), moment.time)];
+    let mut words = vec![time(moment)];
     words.extend(moment.step.map(|step| format!("step {}", grouped(step))));
     words.extend((particles > 0).then(|| format!("N = {}", grouped(particles as u64))));
     let mut body = String::from(r#"<g font-size="18">"#);
@@ -172,6 +172,12 @@ pub fn caption(moment: &Caption, particles: usize, scale: f64) -> Result<Layer, 
     }
     body.push_str("</g>");
     draw((520.0, CAPTION_HEIGHT), scale, &body)
+}
+
+fn time(moment: &Caption) -> String {
+    // a single instant has no distance to another one
+    let every = if moment.every > 0.0 { moment.every } else { moment.time.abs() };
+    format!("t = {:.*} s", digits_of_time(every), moment.time)
 }
 
 /// Decimal digits of times that are so far apart, s: two of the difference are shown, and three at least.
@@ -275,6 +281,15 @@ mod tests {
     fn times_have_the_digits_that_tell_them_apart() {
         let digits = [0.0, 0.05, 0.01, 1e-3, 2.5e-4, 1e-6, 1e-20, f64::NAN].map(digits_of_time);
         assert_eq!(digits, [3, 3, 3, 4, 5, 7, 9, 3]);
+    }
+
+    #[test]
+    fn a_single_instant_has_digits_too() {
+        let at = |time: f64, every: f64| super::time(&Caption { time, every, step: None });
+        assert_eq!(at(1e-7, 0.0), "t = 0.00000010 s");
+        assert_eq!(at(1.25, 0.0), "t = 1.250 s");
+        assert_eq!(at(0.0, 0.0), "t = 0.000 s");
+        assert_eq!(at(1e-7, 2.5e-8), "t = 0.000000100 s");
     }
 
     #[test]

@@ -130,7 +130,12 @@ pub(in crate::cli) struct EvenAxis {
     tick: f64,
     from: f64,
     to: f64,
+    /// What the numbers at the ticks are counted from.
+    origin: f64,
 }
+
+/// Numbers with more digits than these are counted from the lowest of them where a plot can say so.
+const MOST_DIGITS: f64 = 5.0;
 
 impl EvenAxis {
     /// An axis over the finite values, or from 0 to 1 without any.
@@ -151,7 +156,29 @@ impl EvenAxis {
         let power = 10f64.powf((size / TICKS).log10().floor());
         let tick = [5.0, 2.0, 1.0].map(|n| n * power).into_iter().find(|tick| size / tick >= TICKS);
         let tick = tick.unwrap_or(power);
-        Self { low: (low / tick).floor() * tick, high: ((low + size) / tick).ceil() * tick, tick, from, to }
+        let (low, high) = ((low / tick).floor() * tick, ((low + size) / tick).ceil() * tick);
+        Self { low, high, tick, from, to, origin: 0.0 }
+    }
+
+    /// The axis with short numbers: if its values differ in late digits only, they are counted from the lowest.
+    /// [`EvenAxis::origin`] says so, and belongs into the name of the axis.
+    #[must_use]
+    pub fn with_short_numbers(mut self) -> Self {
+        let least = self.low.abs().min(self.high.abs());
+        let is_one_side = self.low * self.high > 0.0;
+        if is_one_side && power(least) - power(self.tick) >= MOST_DIGITS {
+            self.origin = self.low;
+        }
+        self
+    }
+
+    /// What the numbers are counted from, with all its digits; `None` if that is 0.
+    pub fn origin(&self) -> Option<String> {
+        let digits = (power(self.origin.abs()) - power(self.tick)).clamp(0.0, 15.0) as usize;
+        (self.origin != 0.0).then(|| match self.origin.abs() {
+            1e-3..1e6 => format!("{:.*}", (-power(self.tick)).clamp(0.0, 15.0) as usize, self.origin),
+            _ => format!("{:.digits$e}", self.origin),
+        })
     }
 
     /// Brings the zeros of two axes to one height: each gets as many ticks below and above it as the other has.
@@ -177,20 +204,25 @@ impl Axis for EvenAxis {
 
     fn ticks(&self) -> Vec<(f64, String)> {
         let count = ((self.high - self.low) / self.tick).round() as usize;
-        let power = |value: f64| value.log10().floor();
         let digits = (-power(self.tick)).clamp(0.0, 12.0) as usize;
-        let largest = self.low.abs().max(self.high.abs());
+        let largest = (self.low - self.origin).abs().max((self.high - self.origin).abs());
         let large = largest >= 1e6 || self.tick < 1e-6;
         // enough of them to distinguish one tick from the next
         let of_power = (power(largest) - power(self.tick)).clamp(1.0, 12.0) as usize;
         let tick = |k: usize| {
-            let value = self.low + k as f64 * self.tick;
             // the last bits of a sum must not give −0
-            let value = if value.abs() < 1e-9 * self.tick { 0.0 } else { value };
-            (value, if large { format!("{value:.of_power$e}") } else { format!("{value:.digits$}") })
+            let rounded = |value: f64| if value.abs() < 1e-9 * self.tick { 0.0 } else { value };
+            let value = rounded(self.low + k as f64 * self.tick);
+            let number = if self.origin == self.low { k as f64 * self.tick } else { value };
+            (value, if large { format!("{number:.of_power$e}") } else { format!("{number:.digits$}") })
         };
         (0..=count).map(tick).collect()
     }
+}
+
+/// The power of ten of a positive number.
+fn power(value: f64) -> f64 {
+    value.log10().floor()
 }
 
 /// Draws lines at the ticks, and the names of the axes. The plot ends at x = `right`.

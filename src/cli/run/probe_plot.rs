@@ -77,13 +77,13 @@ pub(super) fn drawn(name: &str, probe: &Probe, table: &str, means: Option<&Means
     let axis = |unit: &&str| {
         let own = series.iter().enumerate().filter(|(_, s)| shown(s) && s.unit == *unit);
         let values = own.flat_map(|(k, s)| s.values.iter().copied().chain(known(k)));
-        EvenAxis::over(values, HEIGHT - plot::BOTTOM, TOP)
+        EvenAxis::over(values, HEIGHT - plot::BOTTOM, TOP).with_short_numbers()
     };
     let mut axes: Vec<EvenAxis> = units.iter().map(axis).collect();
     EvenAxis::with_common_zero(&mut axes);
-    plot::grid(&mut out, &x, &axes[0], ["time, s", &axis_name(&series, units[0])], right);
+    plot::grid(&mut out, &x, &axes[0], ["time, s", &axis_name(&series, units[0], &axes[0])], right);
     if let Some(second) = axes.get(1) {
-        plot::right_axis(&mut out, second, &axis_name(&series, units[1]), right);
+        plot::right_axis(&mut out, second, &axis_name(&series, units[1], second), right);
     }
     let mut legend = Legend::new();
     for (k, s) in series.iter().enumerate().filter(|(_, s)| shown(s)) {
@@ -179,8 +179,8 @@ fn columns(probe: &Probe, table: &str) -> (Vec<f64>, Vec<Series>) {
     (column(0), series.collect())
 }
 
-/// What an axis measures: the common words of its columns, and their unit.
-fn axis_name(series: &[Series], unit: &str) -> String {
+/// What an axis measures: the common words of its columns, what they are counted from, and their unit.
+fn axis_name(series: &[Series], unit: &str, axis: &EvenAxis) -> String {
     let own: Vec<&str> = series.iter().filter(|s| s.unit == unit).map(|s| s.name.as_str()).collect();
     let first = own.first().and_then(|name| name.split(' ').next()).unwrap_or_default();
     let what = match &own[..] {
@@ -189,6 +189,7 @@ fn axis_name(series: &[Series], unit: &str) -> String {
         _ if unit == "J" => "energy".into(),
         _ => "value".into(),
     };
+    let what = axis.origin().map_or(what.clone(), |origin| format!("{what} − {origin}"));
     match unit {
         "1" => format!("{what} (no unit)"),
         unit => format!("{what}, {}", unit.replace(' ', "·")),
@@ -288,6 +289,19 @@ mod tests {
         let y: f64 = line.split('"').next().unwrap().parse().unwrap();
         assert!((TOP..HEIGHT - plot::BOTTOM).contains(&y), "{y}");
         assert!(!drawn("p", &probe, table, None).contains("known"));
+    }
+
+    /// A height of a hundred nanometres that changes by a millionth of itself.
+    #[test]
+    fn numbers_that_differ_in_late_digits_are_counted_from_the_lowest() {
+        let probe = Probe::Pressure { at: glam::DVec3::ZERO };
+        let svg = drawn("p", &probe, "time\n0,1.350624e-7\n1,1.3506241e-7\n2,1.3506242e-7\n", None);
+        assert!(svg.contains(">pressure − 1.350624"), "{svg}");
+        let labels = svg.split("text-anchor=\"end\">").skip(1).map(|rest| rest.split('<').next().unwrap());
+        let longest = labels.map(|label| label.chars().count()).max().unwrap();
+        assert!(longest <= 9, "{svg}");
+        let plain = drawn("p", &probe, "time\n0,1000\n1,1003\n", None);
+        assert!(plain.contains(">pressure, Pa<") && plain.contains(">1000.0<"), "{plain}");
     }
 
     #[test]
