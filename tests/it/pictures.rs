@@ -185,6 +185,10 @@ scene rest {{
     let told = run("own", scene(""));
     let (_, end) = told.split_once("drawn again with colours up to ").unwrap_or_else(|| panic!("{told}"));
     let end = end.split_once(" m/s").unwrap().0;
+    // and so do those of the state for ParaView
+    let script = std::fs::read_to_string(folder.path().join("own/open_in_paraview.py")).unwrap();
+    let (_, fastest) = script.split_once("FASTEST = ").unwrap();
+    assert_eq!(fastest.split(' ').next().unwrap().parse::<f64>().unwrap(), end.parse::<f64>().unwrap());
     let stated = scene(&format!("picture {{ fastest: {end} m/s }}"));
     let told = run("stated", stated);
     assert!(!told.contains("drawn again"), "{told}");

@@ -10,7 +10,7 @@ use super::super::failure::warn;
 use super::super::stopwatch::Stopwatch;
 use super::super::{Failure, output};
 use super::bodies::Bodies;
-use super::pictures::{Look, Pictures, Seen};
+use super::pictures::{Look, Pictures, Seen, end_of_colours};
 use super::{checkpoints, folder, paraview, probes};
 use crate::cli::output::{Shown, counted};
 use crate::cli::{saved, surfaces};
@@ -82,7 +82,7 @@ impl Frames {
         }
         if write_frames {
             create(&folder.join("frames"))?;
-            paraview::write(&folder, experiment)?;
+            paraview::write(&folder, experiment, end_of_colours(experiment))?;
         }
         if pictures.is_some() {
             create(&folder.join("pictures"))?;
@@ -220,6 +220,7 @@ impl Frames {
         let Some(end) = better else { return Ok(None) };
         let meshes = self.bodies.meshes_at_start()?;
         let look = Look { fastest: Some(end), ..Look::of(options) };
+        paraview::write(&self.folder, experiment, end)?;
         let mut pictures = Pictures::new(look, experiment, &meshes)?;
         let has_steps = self.saved.iter().all(|saved| saved.step.is_some());
         for (number, saved) in self.saved.iter().enumerate().filter(|(_, saved)| !saved.is_lost) {

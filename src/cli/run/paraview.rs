@@ -11,8 +11,8 @@ pub(super) const NAME: &str = "open_in_paraview.py";
 
 const SCRIPT: &str = include_str!("open_in_paraview.py");
 
-/// Writes the script into the folder of a run.
-pub(super) fn write(folder: &Path, experiment: &Experiment) -> Result<(), Failure> {
+/// Writes the script into the folder of a run. Its colours end at a speed, m/s, as those of the pictures do.
+pub(super) fn write(folder: &Path, experiment: &Experiment, fastest: f64) -> Result<(), Failure> {
     let domain = experiment.domain();
     let whole = std::path::absolute(folder)?;
     let number = |x: f64| format!("{x:?}");
@@ -21,7 +21,7 @@ pub(super) fn write(folder: &Path, experiment: &Experiment) -> Result<(), Failur
     let path = serde_json::to_string(&whole.to_string_lossy()).map_err(std::io::Error::other)?;
     let script = SCRIPT
         .replace("{radius}", &number(0.5 * experiment.parameters().spacing()))
-        .replace("{fastest}", &number(experiment.speed_scale()))
+        .replace("{fastest}", &number(fastest))
         .replace("{low}", &corner(domain.min.to_array()))
         .replace("{high}", &corner(domain.max.to_array()))
         .replace("{folder}", &path);

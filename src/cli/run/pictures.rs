@@ -116,10 +116,8 @@ impl Pictures {
         let camera = camera(look, experiment, Camera::SIZE)?;
         let opened = opened(look, experiment, meshes)?;
         let title = title(experiment, &opened);
-        // a fall is stopped on its way, what drives a fluid otherwise is not
-        let share = if experiment.typical_speed() > 0.0 { FASTEST } else { 1.0 };
         let stated = look.fastest.or(experiment.scene().picture.fastest);
-        let fastest = stated.unwrap_or((share * experiment.speed_scale()).max(experiment.start_speed()));
+        let fastest = stated.unwrap_or_else(|| end_of_colours(experiment));
         let body = |(solid, drawn): (&Solid, Drawn)| {
             let near = (!solid.moves() && solid.has_many_leaves()).then(|| solid.surface(domain));
             Body { solid: solid.clone(), drawn, near }
@@ -216,6 +214,15 @@ impl Pictures {
         }
         places
     }
+}
+
+/// The speed at the end of the colours, m/s, before anything is known of the motion: the one that the scene states, or
+/// one that it lets expect.
+pub(super) fn end_of_colours(experiment: &Experiment) -> f64 {
+    // a fall is stopped on its way, what drives a fluid otherwise is not
+    let share = if experiment.typical_speed() > 0.0 { FASTEST } else { 1.0 };
+    let expected = (share * experiment.speed_scale()).max(experiment.start_speed());
+    experiment.scene().picture.fastest.unwrap_or(expected)
 }
 
 fn columns(places: &[DVec3]) -> [Vec<f64>; 3] {
