@@ -38,6 +38,7 @@ mod saved;
 mod scenery;
 mod section;
 mod shared;
+mod stated;
 mod stopwatch;
 mod surfaces;
 mod survey;

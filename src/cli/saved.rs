@@ -6,8 +6,9 @@ use std::path::{Path, PathBuf};
 use glam::DVec3;
 use serde::Deserialize;
 
-use super::failure::Failure;
+use super::failure::{Failure, note};
 use super::output::{Shown, counted};
+use super::stated::Stated;
 use super::values::Frames;
 use rfm::fluid_surface::{FrameEntry, PointArray, read_arrays, read_collection};
 use rfm::geom::Aabb;
@@ -37,6 +38,12 @@ pub(super) struct RunFigures {
     /// The lowest and the highest corner of the scene's box, m.
     #[serde(default, rename = "box")]
     pub domain: Option<[[f64; 3]; 2]>,
+    /// The number of particles.
+    #[serde(default)]
+    pub particles: Option<usize>,
+    /// What the scene states of its pictures.
+    #[serde(default)]
+    pub picture: Stated,
 }
 
 impl RunFigures {
@@ -44,6 +51,23 @@ impl RunFigures {
     pub fn read(path: &Path) -> Result<Self, String> {
         let text = std::fs::read_to_string(path).map_err(|error| error.to_string())?;
         serde_json::from_str(&text).map_err(|error| error.to_string())
+    }
+
+    /// The summary in the folder of a run. Without one pictures are possible, and a remark says what they lack.
+    pub fn of(folder: &Path) -> Option<Self> {
+        let path = folder.join("summary.json");
+        let why = match Self::read(&path) {
+            Ok(figures) => return Some(figures),
+            Err(_) if !path.exists() => {
+                format!("`{}`, which `rfm run` writes at its end, is not there", path.shown())
+            }
+            Err(error) => format!("cannot read `{}`: {error}", path.shown()),
+        };
+        note(format!(
+            "{why}: the box and the size of the particles are guessed from their places, obstacles have no names, and what \
+             the scene states of its pictures is not known"
+        ));
+        None
     }
 
     /// The box of the scene, if the summary states one.
@@ -104,6 +128,46 @@ pub(super) fn obstacles(folder: &Path, entries: &[(usize, FrameEntry)]) -> Resul
         return Ok((vec![still], vec![Some(0); entries.len()]));
     }
     Ok((Vec::new(), vec![None; entries.len()]))
+}
+
+/// Says which files of obstacles are missing, and what is seen in their place.
+pub(super) fn tell_of_lost_obstacles(
+    folder: &Path,
+    entries: &[(usize, FrameEntry)],
+    figures: Option<&RunFigures>,
+) -> Result<(), Failure> {
+    let list = folder.join("obstacle.pvd");
+    let of_frame = |entry: &FrameEntry| folder.join(entry.file.replace("particles", "obstacle"));
+    if !list.is_file() {
+        let still = folder.join("obstacle.vtp");
+        let names = figures.map(|figures| figures.obstacles.join(", ")).unwrap_or_default();
+        if !still.is_file() && !names.is_empty() {
+            note(format!("`{}` is missing: {names} cannot be drawn", still.shown()));
+        }
+        if entries.iter().any(|(_, entry)| of_frame(entry).is_file()) {
+            note(format!("`{}` is missing: obstacles are drawn where they were at the start", list.shown()));
+        }
+        return Ok(());
+    }
+    let listed = by_time(listed(&list)?);
+    let file = |entry: &FrameEntry| {
+        let there = listed.get(&entry.time.to_bits());
+        there.map_or_else(|| of_frame(entry), |mesh| folder.join(&mesh.file))
+    };
+    let lost = |entry: &FrameEntry| {
+        Some(file(entry)).filter(|path| !listed.contains_key(&entry.time.to_bits()) || !path.is_file())
+    };
+    let mut lost = entries.iter().filter_map(|(_, entry)| lost(entry));
+    let Some(first) = lost.next() else { return Ok(()) };
+    let more = match lost.count() {
+        0 => String::new(),
+        more => format!(", and so are {} more", counted(more, "file")),
+    };
+    note(format!(
+        "`{}` is missing{more}: obstacles are drawn there as in the frame before, or not at all",
+        first.shown()
+    ));
+    Ok(())
 }
 
 /// What pictures of a run are of: its file, its scene and its method, or the folder if the run does not tell.

@@ -5,7 +5,8 @@ use std::path::Path;
 use glam::DVec3;
 use rayon::prelude::*;
 
-use super::failure::Failure;
+use super::failure::{Failure, note};
+use super::output::Shown;
 use super::saved::{self, RunFigures};
 use rfm::fluid_surface::{FrameEntry, PointArray};
 use rfm::geom::Aabb;
@@ -23,6 +24,8 @@ pub(super) struct Survey {
     pub velocity: Option<Levels>,
     /// The number of particles of all frames together.
     pub particles: usize,
+    /// That of each frame.
+    pub counts: Vec<usize>,
 }
 
 /// Whether an array is that of the velocities.
@@ -45,10 +48,12 @@ impl Survey {
             arrays: Vec::new(),
             velocity: None,
             particles: 0,
+            counts: Vec::new(),
         });
         for next in surveys {
             all.bounds = all.bounds.union(&next.bounds);
             all.particles += next.particles;
+            all.counts.extend(next.counts);
             all.velocity = all.velocity.zip(next.velocity).map(|(range, other)| range.with(other));
             all.arrays.retain_mut(|(name, range)| {
                 let same = next.arrays.iter().find(|(other, _)| other == name);
@@ -79,7 +84,32 @@ impl Survey {
                 Levels { low: -largest, high: largest }
             }),
             particles: points.len(),
+            counts: vec![points.len()],
         }
+    }
+
+    /// Says which frames do not seem to be of the run that its summary is about: a run keeps its particles.
+    pub fn tell_of_other_runs(
+        &self,
+        folder: &Path,
+        entries: &[(usize, FrameEntry)],
+        figures: Option<&RunFigures>,
+    ) {
+        let told = figures.and_then(|figures| figures.particles);
+        let expected = told.or(self.counts.first().copied()).unwrap_or_default();
+        let mut others = entries.iter().zip(&self.counts).filter(|(_, count)| **count != expected);
+        let Some(((_, entry), count)) = others.next() else { return };
+        let more = others.count();
+        let more = if more > 0 {
+            format!(", and {more} more frames have another number, too")
+        } else {
+            String::new()
+        };
+        let run = if told.is_some() { "summary.json tells of" } else { "the first frame has" };
+        note(format!(
+            "`{}` has {count} particles, and {run} {expected}{more}: frames of another run may be among them",
+            folder.join(&entry.file).shown()
+        ));
     }
 
     /// The box of the scene if a summary states it, and otherwise that around all particles.

@@ -27,5 +27,5 @@ pub use coarse::coarse;
 pub use levels::{Lattice, Levels, UNKNOWN_LEVEL};
 pub use page::{Page, Sizes, document, solid};
 pub use pose::{columns, pose};
-pub use setting::{Array, Column, Corners, Param, Plot, Setting, VELOCITY};
+pub use setting::{Array, Column, Corners, Outset, OutsetCut, Param, Plot, Setting, VELOCITY};
 pub use surface::{pack_surface, reduced};

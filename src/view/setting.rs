@@ -35,6 +35,34 @@ pub struct Setting {
     pub params: Vec<Param>,
     /// Quantities over time; `None` if they are sent separately.
     pub plots: Option<Vec<Plot>>,
+    /// How the scene is seen at the beginning; `None` if nothing states it.
+    pub picture: Option<Outset>,
+}
+
+/// How a scene is seen at the beginning, as far as its file states that for its pictures.
+#[derive(Debug, Clone, PartialEq, Default, Serialize)]
+pub struct Outset {
+    /// The direction from the scene to the eye.
+    pub camera: Option<[f64; 3]>,
+    /// The place in the middle, m.
+    pub look_at: Option<[f64; 3]>,
+    /// How many times as large as if the whole box were seen.
+    pub zoom: Option<f64>,
+    /// The plane that opens the obstacles.
+    pub cut: Option<OutsetCut>,
+    /// The look of the obstacles, `opaque`, `transparent` or `hidden`; `None`: as they hide the fluid or not.
+    pub obstacle: Option<&'static str>,
+}
+
+/// A plane across an axis that opens what is drawn.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct OutsetCut {
+    /// The axis: 0, 1 or 2.
+    pub axis: usize,
+    /// Where the plane meets the axis, m.
+    pub at: f64,
+    /// Whether the part at smaller coordinates is taken away.
+    pub below: bool,
 }
 
 /// The lowest and the highest corner of a box.

@@ -53,6 +53,7 @@ mod render;
 mod reports;
 mod rounding;
 mod run;
+mod saved_pictures;
 mod simplify;
 mod source;
 mod still;

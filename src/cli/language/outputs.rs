@@ -37,7 +37,7 @@ const FILES: [Entry; 13] = [
     ("checkpoints/*", "", "the last two whole states, from which `--resume` goes on"),
 ];
 
-const SUMMARY: [Entry; 43] = [
+const SUMMARY: [Entry; 44] = [
     ("schema", "", "the number of this form, 1: keys may be added to it, and none changes its meaning"),
     ("file", "", "the name of the file, without its folder"),
     ("scene", "", "the name of the scene"),
@@ -128,6 +128,11 @@ const SUMMARY: [Entry; 43] = [
     ("probes", "", "the means of probes with `from` or `known`, see below; absent without any"),
     ("passes", "", "the parts of a step, in their order"),
     ("box", "m", "the lowest and the highest corner of the box of the scene"),
+    (
+        "picture",
+        "",
+        "what the scene states in `picture { … }`, for later pictures: null and empty where it states nothing",
+    ),
     ("threads", "", "the number of threads; results do not depend on it"),
     ("frames", "", "the number of frames that were saved"),
     ("finished", "", "whether the run reached its end; false after Ctrl-C and after an error"),

@@ -4,16 +4,15 @@ use std::path::{Path, PathBuf};
 
 use glam::DVec3;
 
+use super::look::{Look, Opened};
 use super::options::Render;
 use crate::cli::failure::Failure;
 use crate::cli::output::Shown;
 use crate::cli::saved::{self, RunFigures};
-use crate::cli::scenery::{Drawn, glass, half_towards_eye, opened_by, out_of_the_way};
-use crate::cli::values::CutFlag;
+use crate::cli::scenery::{Drawn, glass, opened_by, out_of_the_way};
 use rfm::fluid_surface::{FrameEntry, read_arrays, read_mesh};
 use rfm::mesh::Mesh;
-use rfm::render::Camera;
-use rfm::slice::Plane;
+use rfm::render::{Camera, Cut};
 
 /// Most particles of the first frame that stand for the fluid when it is asked what hides it.
 const MOST_SAMPLES: usize = 3000;
@@ -55,7 +54,7 @@ impl Bodies {
     }
 
     /// How each of them is drawn.
-    pub fn drawn(&self, options: &Render, camera: &Camera) -> Result<Vec<Drawn>, Failure> {
+    pub fn drawn(&self, options: &Render, look: &Look<'_>, camera: &Camera) -> Result<Vec<Drawn>, Failure> {
         let is_unknown = |name: &&String| !self.are_named || !self.names.contains(*name);
         let unknown = |flag, given: &[String]| given.iter().find(is_unknown).map(|name| (flag, name.clone()));
         if let Some((flag, unknown)) =
@@ -72,20 +71,23 @@ impl Bodies {
             };
             return Err(Failure::usage(format!("{flag} {unknown}: {reason}")));
         }
-        let is_hidden = |name: &String| self.are_named && options.hide.contains(name);
-        let is_glass = |name: &String| self.are_named && options.glass.contains(name);
-        let by_plane = |plane: &Plane, mesh: &Mesh| {
-            let cut = half_towards_eye(plane, camera);
+        let is_among = |lists: [&[String]; 2], name: &String| {
+            self.are_named && lists.iter().any(|list| list.contains(name))
+        };
+        let is_hidden = |name: &String| is_among(look.hidden(), name);
+        let is_glass = |name: &String| is_among(look.glass(), name);
+        let by_plane = |cut: Cut, mesh: &Mesh| {
             // where bodies that move will be is not looked up
             if self.stand { opened_by(cut, mesh.positions.iter().copied()) } else { Drawn::Open(cut) }
         };
-        let drawn = |(name, mesh): (&String, &Mesh)| match &options.cut {
+        let opened = look.opened(camera);
+        let drawn = |(name, mesh): (&String, &Mesh)| match opened {
             _ if is_hidden(name) => Drawn::Hidden,
-            Some(CutFlag::Plane(plane)) if is_glass(name) => glass(by_plane(plane, mesh)),
+            Opened::By(cut) if is_glass(name) => glass(by_plane(cut, mesh)),
             _ if is_glass(name) => Drawn::Glass(None),
-            Some(CutFlag::None) => Drawn::Whole,
-            Some(CutFlag::Plane(plane)) => by_plane(plane, mesh),
-            Some(CutFlag::Auto) | None => out_of_the_way(camera, name, mesh, &self.samples),
+            Opened::Nothing => Drawn::Whole,
+            Opened::By(cut) => by_plane(cut, mesh),
+            Opened::Automatic => out_of_the_way(camera, name, mesh, &self.samples),
         };
         Ok(self.names.iter().zip(&self.meshes).map(drawn).collect())
     }

@@ -4,6 +4,7 @@
 //! |---|---|
 //! | `options` | the flags, with the help that teaches them |
 //! | `scene` | the folder of a run → a picture of each frame |
+//! | `look` | the flags and what the scene states → the camera, the cut, the colours' ends |
 //! | `bodies` | its obstacles, and how each of them is drawn |
 //! | `solid` | an obstacle file → one picture, or a film of what moves |
 //! | `film` | pictures → .png files, .gif, .apng |
@@ -15,6 +16,7 @@
 mod bodies;
 mod ffmpeg;
 mod film;
+mod look;
 mod options;
 mod scene;
 mod solid;

@@ -44,7 +44,7 @@ impl Surface {
                         A solid:                     rfm render examples/pawn.rfm -o pawn.png\n\
                         A solid that moves:          rfm render examples/paddle.rfm -o paddle.gif --times 0..2\n\n\
                         The folder is that of `rfm run`, finished or not: its frames, obstacle.vtp and summary.json are read, so \
-                        nothing is computed again. All pictures of a command have one camera, one range of colours and the same \
+                        nothing is computed again. What the scene states in `picture { … }` holds where no flag says otherwise. All pictures of a command have one camera, one range of colours and the same \
                         cut. .png, .gif and .apng are built in and have the same bytes for any number of threads; .mp4 and .webm \
                         are made by the program `ffmpeg`, which must be installed. A .gif has 255 colours, an .apng has all.")]
 pub(in crate::cli) struct Render {
@@ -91,7 +91,8 @@ pub(in crate::cli) struct Render {
     /// Draw the particles, too, within the surface
     #[arg(long, help_heading = "Runs", requires = "surface")]
     pub particles: bool,
-    /// Colour particles by this array of the frames, and the surface if there is one [default: speed, and water]
+    /// Colour particles by this array of the frames, or by "velocity x", and the surface if there is one [default: speed,
+    /// and water]
     #[arg(long, help_heading = "Runs", value_name = "ARRAY")]
     pub by: Option<String>,
     /// The values at the ends of the colours, in SI units [default: those of the chosen frames without the outermost

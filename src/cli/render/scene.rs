@@ -8,23 +8,22 @@ use glam::DVec3;
 
 use super::bodies::{Bodies, bodies_of};
 use super::film::Target;
+use super::look::{Look, Opened};
 use super::options::{Render, Surface};
-use super::solid::camera;
 use crate::cli::failure::{Failure, note};
 use crate::cli::output::{self, Shown, significant};
 use crate::cli::saved::{self, RunFigures};
-use crate::cli::scenery::{self, Drawn, half_towards_eye};
+use crate::cli::scenery::{self, Drawn};
 use crate::cli::shared::Shared;
 use crate::cli::surfaces;
-use crate::cli::survey::Survey;
-use crate::cli::values::CutFlag;
+use crate::cli::survey::{Survey, is_velocity};
 use rfm::diagnostic::nearest;
 use rfm::field::Points;
 use rfm::fluid_surface::{FrameEntry, read_arrays, read_mesh, values_at};
 use rfm::geom::Aabb;
 use rfm::mesh::Mesh;
 use rfm::render::{Backdrop, Caption, Cut, Image, Legend, MeshView, Moving, ParticlesView, Scale};
-use rfm::view::{Array, Levels};
+use rfm::view::{Array, Levels, VELOCITY};
 
 pub(super) fn run(shared: &Shared, options: &Render) -> Result<(), Failure> {
     let folder = options.subject.as_path();
@@ -62,7 +61,7 @@ struct RunScene {
     drawn: Vec<Drawn>,
     domain: Aabb,
     radius: f64,
-    /// The mean time between frames, s.
+    /// The mean time between frames of the run, s.
     every: f64,
     /// The array that is shown, with its unit and its range.
     shown: Array,
@@ -88,22 +87,28 @@ impl RunScene {
     fn open(folder: &Path, options: &Render) -> Result<Self, Failure> {
         let all = saved::collection(folder)?;
         let first = all[0].clone();
+        // of all frames: a single one of them has digits of its time, too
+        let length = all[all.len() - 1].time - first.time;
+        let every = length / (all.len() - 1).max(1) as f64;
         let mut entries = saved::chosen(all, options.frames)?;
         if let Some((from, to)) = options.times {
             entries = at_times(entries, (from, to))?;
         }
         let entries: Vec<_> = entries.into_iter().step_by(options.every.unwrap_or(1)).collect();
         saved::check_frames(folder, &entries)?;
-        let figures = RunFigures::read(&folder.join("summary.json")).ok();
+        let figures = RunFigures::of(folder);
         let survey = Survey::of(folder, &entries)?;
+        survey.tell_of_other_runs(folder, &entries, figures.as_ref());
+        saved::tell_of_lost_obstacles(folder, &entries, figures.as_ref())?;
         let domain = survey.domain(figures.as_ref());
         let radius = survey.radius(figures.as_ref(), entries.len());
         let (shown, found) = shown(options, &survey)?;
-        let range = options.range.map_or(found, |(low, high)| Levels { low, high });
-        let camera = camera(options, &domain)?;
+        let look = Look::new(options, figures.as_ref().map(|figures| &figures.picture));
+        let range = look.range(&shown.name).unwrap_or(found);
+        let camera = look.camera(&domain)?;
         let (meshes, mesh_of) = saved::obstacles(folder, &entries)?;
         let bodies = Bodies::at_start(folder, &first, &meshes, figures.as_ref())?;
-        let drawn = bodies.drawn(options, &camera)?;
+        let drawn = bodies.drawn(options, &look, &camera)?;
         let names: Vec<&str> = bodies.names.iter().map(String::as_str).collect();
         let title = options.title.clone().unwrap_or_else(|| {
             let words = saved::subject(folder, figures.as_ref()).into_iter();
@@ -115,9 +120,9 @@ impl RunScene {
         };
         let balls = options.surface.is_none() || options.particles;
         let tinted = options.surface.is_some() && options.by.is_some();
-        let cut = match &options.cut {
-            Some(CutFlag::Plane(plane)) => Some(half_towards_eye(plane, &camera)),
-            Some(CutFlag::Auto | CutFlag::None) | None => None,
+        let cut = match look.opened(&camera) {
+            Opened::By(cut) => Some(cut),
+            Opened::Automatic | Opened::Nothing => None,
         };
         if options.cut_fluid && cut.is_none() {
             return Err(Failure::usage(
@@ -136,8 +141,6 @@ impl RunScene {
         let scale = Scale { label: &label, low: range.low, high: range.high, open, map };
         let legend = Legend { title: &title, scale: (balls || tinted).then_some(scale) };
         let still = scenery::backdrop(&camera, &domain, &legend, drawn.iter().copied().zip(&bodies))?;
-        let length = entries[entries.len() - 1].1.time - entries[0].1.time;
-        let every = length / (entries.len() - 1).max(1) as f64;
         Ok(Self {
             folder: folder.to_path_buf(),
             every,
@@ -210,8 +213,14 @@ impl RunScene {
         let file = std::fs::read(&path).map_err(|error| failed(error.to_string()))?;
         let (mut points, arrays) = read_arrays(&file).map_err(|error| failed(error.to_string()))?;
         let name = &self.shown.name;
-        let array = arrays.into_iter().find(|array| array.name == *name && array.components == 1);
-        let values = array.ok_or_else(|| failed(format!("the array `{name}` is missing")))?.values;
+        let own = arrays.iter().find(|array| array.name == *name && array.components == 1);
+        let part = VELOCITY.iter().position(|component| component == name);
+        let (array, first) = match (own, part) {
+            (None, Some(component)) => (arrays.iter().find(|array| is_velocity(array)), component),
+            (own, _) => (own, 0),
+        };
+        let array = array.ok_or_else(|| failed(format!("the array `{name}` is missing")))?;
+        let values = array.values.iter().skip(first).step_by(array.components).copied().collect();
         let (low, high) = (self.domain.min + self.radius, self.domain.max - self.radius);
         if low.cmple(high).all() {
             let near = self.domain.grown(self.radius);
@@ -255,14 +264,17 @@ impl RunScene {
         match speed {
             0.98..1.02 => Some("the fluid as fast as it was".into()),
             1.0.. if speed.is_finite() => {
-                Some(format!("the fluid {} times as fast as it was", significant(speed, 1)))
+                Some(format!("the fluid {} times as fast as it was", factor(speed)))
             }
-            0.0..1.0 if speed > 0.0 => {
-                Some(format!("the fluid slowed down {} times", significant(1.0 / speed, 1)))
-            }
+            0.0..1.0 if speed > 0.0 => Some(format!("the fluid slowed down {} times", factor(1.0 / speed))),
             _ => None,
         }
     }
+}
+
+/// A factor of 1 and more as a person reads it.
+fn factor(factor: f64) -> String {
+    if factor < 1e3 { significant(factor, 1) } else { format!("{factor:.1e}") }
 }
 
 /// The mesh of a surface of the fluid.
@@ -294,8 +306,12 @@ fn at_times(
 /// The array that is shown, and the range of its values in all frames.
 fn shown(options: &Render, survey: &Survey) -> Result<(Array, Levels), Failure> {
     let name = options.by.as_deref().unwrap_or("speed");
-    let names = || survey.arrays.iter().map(|(name, _)| name.as_str());
-    let Some((_, found)) = survey.arrays.iter().find(|(known, _)| known == name) else {
+    // the viewer has the components of the velocity, too
+    let velocity = survey.velocity.into_iter().flat_map(|range| VELOCITY.map(|name| (name, range)));
+    let own = survey.arrays.iter().map(|(name, range)| (name.as_str(), *range));
+    let arrays: Vec<(&str, Levels)> = own.chain(velocity).collect();
+    let names = || arrays.iter().map(|(name, _)| *name);
+    let Some((_, found)) = arrays.iter().find(|(known, _)| *known == name) else {
         let near = nearest(name, names()).map_or(String::new(), |near| format!("; did you mean `{near}`?"));
         let there = names().collect::<Vec<_>>().join(", ");
         return Err(Failure::usage(format!(

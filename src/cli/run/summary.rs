@@ -9,6 +9,7 @@ use super::pictures;
 use super::probes::Probes;
 use super::watch::Watch;
 use crate::cli::output::{Shown, significant};
+use crate::cli::stated::Stated;
 use rfm::Experiment;
 use rfm::experiment::Deviation;
 use rfm::sph::{Pass, Simulation};
@@ -89,6 +90,8 @@ pub(super) struct Summary {
     /// The lowest and the highest corner of the scene's box, m.
     #[serde(rename = "box")]
     domain: [[f64; 3]; 2],
+    /// What the scene states of its pictures.
+    picture: Stated,
     threads: usize,
     frames: usize,
     finished: bool,
@@ -153,6 +156,7 @@ impl Summary {
             probes,
             passes: pass_names(simulation),
             domain: [domain.min.to_array(), domain.max.to_array()],
+            picture: Stated::of(&experiment.scene().picture),
             threads: rayon::current_num_threads(),
             frames,
             finished,
@@ -163,12 +167,12 @@ impl Summary {
 /// Prints the summary as text. The colours of pictures may have been `fitted` to end at a speed, m/s.
 pub(super) fn print(summary: &Summary, (frames, fitted): (&Frames, Option<f64>), probes: &Probes) {
     say!(
-        "{} particles {:.3e} m apart, {} steps of {:.3e} s = {:.3} s simulated",
+        "{} particles {:.3e} m apart, {} steps of {:.3e} s = {} s simulated",
         summary.particles,
         summary.spacing,
         summary.steps,
         summary.time_step,
-        summary.simulated_seconds
+        significant(summary.simulated_seconds, 3)
     );
     say!(
         "{:.2} ms per step on {} thread(s), {:.1} neighbours per particle",

@@ -8,6 +8,7 @@ use std::path::{Path, PathBuf};
 use super::super::failure::Failure;
 use super::super::output::counted;
 use super::super::saved::{self, RunFigures};
+use super::super::stated::Stated;
 use super::super::surfaces;
 use super::super::survey::{Survey, is_velocity};
 use super::options::{Surfaces, View};
@@ -44,8 +45,10 @@ impl SavedRun {
         let chosen = saved::chosen(saved::collection(folder)?, options.frames)?;
         let entries: Vec<_> = chosen.into_iter().step_by(options.every).collect();
         saved::check_frames(folder, &entries)?;
-        let figures = RunFigures::read(&folder.join("summary.json")).ok();
+        let figures = RunFigures::of(folder);
         let survey = Survey::of(folder, &entries)?;
+        survey.tell_of_other_runs(folder, &entries, figures.as_ref());
+        saved::tell_of_lost_obstacles(folder, &entries, figures.as_ref())?;
         let (meshes, mesh_of) = saved::obstacles(folder, &entries)?;
         let surfaces = match options.surfaces {
             Surfaces::None => vec![None; entries.len()],
@@ -56,6 +59,12 @@ impl SavedRun {
         let velocity = survey.velocity.into_iter();
         arrays.extend(velocity.flat_map(|range| VELOCITY.map(|name| (name.to_string(), range))));
         let lattice = Lattice::new(&domain.union(&survey.bounds));
+        let picture = figures.as_ref().map(|figures| &figures.picture);
+        // the levels of frames keep the range of the frames
+        let colours = |name: &str, range| match picture.and_then(|picture| picture.fastest) {
+            Some(high) if name == "speed" => Levels { low: 0.0, high },
+            Some(_) | None => range,
+        };
         let setting = Setting {
             title: saved::title(folder),
             facts: facts(&entries, &survey, figures.as_ref()),
@@ -65,11 +74,15 @@ impl SavedRun {
             domain: Corners::from(&domain),
             lattice: Some(Corners::from(lattice.bounds())),
             radius: survey.radius(figures.as_ref(), entries.len()),
-            arrays: arrays.iter().map(|(name, range)| Array::named(name, Some(*range))).collect(),
+            arrays: arrays
+                .iter()
+                .map(|(name, range)| Array::named(name, Some(colours(name, *range))))
+                .collect(),
             solids: Vec::new(),
             gravity: None,
             params: Vec::new(),
             plots: Some(plots::saved(folder)),
+            picture: picture.map(Stated::outset),
         };
         let (folder, particles) = (folder.to_path_buf(), survey.particles);
         let is_fine = options.surfaces == Surfaces::Fine;

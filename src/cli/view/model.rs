@@ -8,6 +8,7 @@ use super::super::choose;
 use super::super::failure::Failure;
 use super::super::input;
 use super::super::shared::Shared;
+use super::super::stated::Stated;
 use super::course::{Course, Flow, Motion};
 use super::messages::{message, plain, refused};
 use super::options::View;
@@ -260,7 +261,10 @@ impl Subject {
             }
             (None, None, _) => String::new(),
         };
-        let fastest = flow.map(|flow| Levels { low: 0.0, high: flow.experiment.speed_scale() });
+        let stated = scene.map(|scene| Stated::of(&scene.picture));
+        let end = stated.as_ref().and_then(|stated| stated.fastest);
+        let fastest =
+            flow.map(|flow| Levels { low: 0.0, high: end.unwrap_or_else(|| flow.experiment.speed_scale()) });
         let [x, y, z] = VELOCITY;
         let arrays = ["speed", "density", "pressure", x, y, z].map(|name| {
             Array::named(name, fastest.filter(|range| name == "speed" && range.high.is_finite()))
@@ -285,6 +289,7 @@ impl Subject {
             }),
             params: checked.map_or_else(Vec::new, params),
             plots: flow.is_none().then(Vec::new),
+            picture: stated.as_ref().map(Stated::outset),
         }
     }
 }
