@@ -217,6 +217,18 @@ mod tests {
     }
 
     #[test]
+    fn lines_meet_as_in_the_viewer_however_large_things_are() {
+        let camera = Camera::new(&cube(), DVec3::new(0.6, -0.64, 0.48), (1280, 720)).unwrap();
+        let near = camera.clone().aimed(DVec3::new(2.0, 1.0, 0.5), 5.0);
+        for camera in [camera, near] {
+            let nearness = |x: f64, y: f64, z: f64| camera.look(DVec3::new(x, y, z)).unwrap().nearness;
+            let ratio = nearness(3.0, 0.0, 3.0) / nearness(0.0, 3.0, 0.0);
+            // tests/viewer asks the page for the same figure
+            assert!((ratio - 1.396_665_022_888_28).abs() < 1e-9, "{ratio}");
+        }
+    }
+
+    #[test]
     fn odd_boxes_and_views_are_errors_or_drawn() {
         let size = Camera::SIZE;
         assert!(matches!(Camera::three_quarter(&Aabb::EMPTY, size), Err(RenderError::Bounds(_))));

@@ -66,6 +66,27 @@ function turnMatrix(q, centre) {
   return new Float32Array([...columns[0], 0, ...columns[1], 0, ...columns[2], 0, ...rest, 1]);
 }
 
+/** The pose between two others: it goes straight, or turns about a line, or both, evenly. */
+function poseBetween(from, to, part) {
+  const [a, b] = [from, to].map((pose) => [0, 3, 6, 9].map((k) => pose.slice(k, k + 3)));
+  // the rotation from one to the other, its rows, and how far it moves what is at 0
+  const rows = [0, 1, 2].map((i) => [0, 1, 2].map((j) => b[0][i] * a[0][j] + b[1][i] * a[1][j] + b[2][i] * a[2][j]));
+  const way = sub(b[3], rows.map((row) => dot(row, a[3])));
+  const twice = [rows[2][1] - rows[1][2], rows[0][2] - rows[2][0], rows[1][0] - rows[0][1]];
+  const angle = Math.atan2(norm(twice), rows[0][0] + rows[1][1] + rows[2][2] - 1);
+  const straight = norm(twice) < 1e-9;
+  // half a turn has no side on which it goes
+  if (straight && angle > 1) return part < 0.5 ? from : to;
+  if (straight) return a.slice(0, 3).flat().concat(add(a[3], scale(way, part)));
+  const axis = unit(twice);
+  const along = scale(axis, dot(axis, way));
+  const across = sub(way, along);
+  const middle = scale(add(across, scale(cross(axis, across), 1 / Math.tan(angle / 2))), 0.5);
+  const turn = turnAbout(axis, angle * part);
+  const place = add(middle, turned(turn, sub(a[3], middle)));
+  return a.slice(0, 3).flatMap((column) => turned(turn, column)).concat(add(place, scale(along, part)));
+}
+
 /** A number for people: three or four digits, and a power of ten where it is far from 1. */
 function shown(x, digits = 3) {
   if (!Number.isFinite(x)) return "–";

@@ -1,11 +1,18 @@
 // From where the scene is seen, and how pointers change that.
 
-/** Half the angle of view, radians. */
-const HALF_ANGLE = (17 * Math.PI) / 180;
+/** The distance of the eye from the middle of the box, in diagonals of the box: as in src/render/camera.rs. */
+const EYE = 3;
+
+/** The height of the first picture, in halves of that diagonal: a ball around the box is seen whole. */
+const WHOLE = (2 * 1.02) / Math.sqrt(1 - 1 / (2 * EYE) ** 2);
+
+/** How many times as large or small as at first things may become. */
+const MOST_ZOOM = 20;
 
 /** The direction to the eye at the beginning: that of the pictures of `rfm run`. */
 const FIRST_DIRECTION = unit([0.48, -1, 0.46]);
 
+/** The eye stays where it is when things become larger, as in the pictures of `rfm render`: so both have one perspective. */
 class Camera {
   constructor() {
     this.turn = NO_TURN;
@@ -15,16 +22,26 @@ class Camera {
 
   /** Takes the box that is to be seen. */
   frame({ min, max }) {
+    this.box = { min, max };
     this.centre = scale(add(min, max), 0.5);
     this.reach = Math.max(norm(sub(max, min)) / 2, 1e-9);
     this.home();
   }
 
+  /** The view of the beginning: that which the scene states for its pictures, as far as it does. */
   home() {
-    this.look(FIRST_DIRECTION);
-    this.target = this.centre;
-    this.distance = (this.reach / Math.sin(HALF_ANGLE)) * 1.02;
+    const { camera, look_at, zoom } = this.stated ?? {};
+    this.look(camera ?? FIRST_DIRECTION);
+    this.target = look_at ?? this.centre;
+    /** The height of what is seen about the target, m, where the picture is no narrower than it is high. */
+    this.height = WHOLE * this.reach;
+    if (zoom) this.height = this.renderedHeight(this.box, this.axes().towards, this.target) / zoom;
     this.turn = NO_TURN;
+  }
+
+  /** The distance of the eye from the middle of the box, m. */
+  get distance() {
+    return 2 * EYE * this.reach;
   }
 
   /** Looks from a direction. */
@@ -45,7 +62,7 @@ class Camera {
   /** The matrix from the box to the eye. */
   view() {
     const { right, up, towards } = this.axes();
-    const eye = add(this.target, scale(towards, this.distance));
+    const eye = add(this.centre, scale(towards, this.distance));
     const look = new Float32Array([
       right[0], up[0], towards[0], 0, right[1], up[1], towards[1], 0, right[2], up[2], towards[2], 0,
       -dot(right, eye), -dot(up, eye), -dot(towards, eye), 1,
@@ -58,8 +75,7 @@ class Camera {
     const towards = turned(back(this.turn), this.axes().towards);
     const at = add(this.centre, turned(back(this.turn), sub(this.target, this.centre)));
     const aspect = Math.max(width - free.left - free.right, 60) / Math.max(height - free.top - free.bottom, 60);
-    const seen = (2 * Math.tan(HALF_ANGLE) * this.distance) / Math.min(aspect, 1);
-    const zoom = clamp(this.renderedHeight(box, towards, at) / seen, 0.05, 20);
+    const zoom = clamp((this.renderedHeight(box, towards, at) / this.height) * Math.min(aspect, 1), 0.05, 20);
     // places are rounded to a part of the box, which may be millimetres wide
     const digits = clamp(5 - Math.floor(Math.log10(Math.max(...sub(box.max, box.min)))), 0, 20);
     const numbers = (v, places) => `[${v.map((x) => Number(x.toFixed(places)) + 0).join(", ")}]`;
@@ -73,7 +89,7 @@ class Camera {
     const room = [page[0] - margins[0] - margins[2], page[1] - margins[1] - margins[3]];
     const right = norm(cross([0, 0, 1], towards)) > 1e-12 ? unit(cross([0, 0, 1], towards)) : [1, 0, 0];
     const up = cross(towards, right);
-    const eye = add(scale(add(min, max), 0.5), scale(towards, 3 * norm(sub(max, min))));
+    const eye = add(scale(add(min, max), 0.5), scale(towards, EYE * norm(sub(max, min))));
     const depth = (p) => dot(sub(eye, p), towards);
     const corners = [0, 1, 2, 3, 4, 5, 6, 7].map((i) => [0, 1, 2].map((axis) => ((i >> axis) & 1 ? max : min)[axis]));
     const seen = corners.map((p) => [right, up].map((axis) => dot(sub(p, eye), axis) / depth(p)));
@@ -82,20 +98,21 @@ class Camera {
     return (room[1] * depth(point)) / focal;
   }
 
-  /** The matrix from the eye to a page of so many pixels, whose middle is that of what the controls leave free. */
+  /** The matrix from the eye to a page of so many pixels. The target is in the middle of what the controls leave free. */
   projection([width, height], free) {
     const [w, h] = [Math.max(width - free.left - free.right, 60), Math.max(height - free.top - free.bottom, 60)];
     const aspect = w / h;
     // a narrow window keeps the whole box in its width
-    const tangent = Math.tan(HALF_ANGLE) / Math.min(aspect, 1);
-    const reach = this.reach * 3 + norm(sub(this.target, this.centre));
+    const half = this.height / Math.min(aspect, 1) / 2;
+    const [sx, sy] = [1 / (half * aspect), 1 / half];
+    const { right, up, towards } = this.axes();
+    const [tx, ty, tz] = [right, up, towards].map((axis) => dot(axis, sub(this.target, this.centre)));
+    const [reach, depth] = [3 * this.reach, this.distance - tz];
     let lens;
-    if (this.parallel) {
-      const half = tangent * this.distance;
-      lens = [1 / (half * aspect), 0, 0, 0, 0, 1 / half, 0, 0, 0, 0, -1 / reach, 0, 0, 0, -this.distance / reach, 1];
-    } else {
-      const [far, near] = [this.distance + reach, Math.max(this.distance - reach, 0.003 * this.distance)];
-      lens = [1 / (tangent * aspect), 0, 0, 0, 0, 1 / tangent, 0, 0, 0, 0, (far + near) / (near - far), -1, 0, 0, (2 * far * near) / (near - far), 0];
+    if (this.parallel) lens = [sx, 0, 0, 0, 0, sy, 0, 0, 0, 0, -1 / reach, 0, -sx * tx, -sy * ty, -this.distance / reach, 1];
+    else {
+      const [far, near] = [this.distance + reach, this.distance - reach];
+      lens = [sx * depth, 0, 0, 0, 0, sy * depth, 0, 0, sx * tx, sy * ty, (far + near) / (near - far), -1, 0, 0, (2 * far * near) / (near - far), 0];
     }
     const [x, y] = [(2 * free.left + w) / width - 1, 1 - (2 * free.top + h) / height];
     const place = new Float32Array([w / width, 0, 0, 0, 0, h / height, 0, 0, 0, 0, 1, 0, x, y, 0, 1]);
@@ -115,13 +132,25 @@ class Camera {
 
   pan(dx, dy, height) {
     const { right, up } = this.axes();
-    const size = (2 * this.distance * Math.tan(HALF_ANGLE)) / height;
-    this.target = add(this.target, add(scale(right, -dx * size), scale(up, dy * size)));
+    const size = this.height / height;
+    const off = sub(add(this.target, add(scale(right, -dx * size), scale(up, dy * size))), this.centre);
+    // it stays before the eye from wherever it is looked at
+    this.target = add(this.centre, scale(off, Math.min(1, (2 * this.reach) / Math.max(norm(off), 1e-300))));
   }
 
   zoom(factor) {
-    this.distance = clamp(this.distance * factor, this.reach * 0.05, this.reach * 60);
+    const first = WHOLE * this.reach;
+    this.height = clamp(this.height * factor, first / MOST_ZOOM, first * MOST_ZOOM);
   }
+}
+
+/** What makes the picture of `rfm render` that of the viewer besides the camera, in words. `at` is where the cut is, m. */
+function besides({ cutting: { axis, solid, fluid }, obstacle, parallel }, at, hasSolid) {
+  const flags = [];
+  if (axis !== "none" && (solid || fluid)) flags.push(`--cut ${axis}=${Number(at.toPrecision(4))}${fluid ? " --cut-fluid" : ""}`);
+  else if (hasSolid) flags.push("--cut none");
+  if (hasSolid && obstacle !== "opaque") flags.push(obstacle === "hidden" ? "--hide NAME" : "--glass NAME");
+  return (flags.length ? `; beside it: ${flags.join(" ")}` : "") + (parallel ? "; pictures have a perspective, and not parallel lines" : "");
 }
 
 /** Listens to pointers on the canvas. `changed` is called after each change, `turns` says whether a drag turns the box. */

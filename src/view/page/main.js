@@ -2,6 +2,9 @@
 
 const byId = (id) => document.getElementById(id);
 
+/** An obstacle that hides more than this part of the fluid at first begins transparent. */
+const MOST_HIDDEN = 0.35;
+
 class Viewer {
   constructor(setting) {
     this.canvas = byId("view");
@@ -22,6 +25,7 @@ class Viewer {
       cutting: { axis: "none", part: 0.5, flipped: false, solid: true, fluid: true }, turns: false, gravityInRoom: true,
       slicing: { axis: "none", part: 0.5 }, arrows: false, arrowLength: 1, trails: false, trailFrames: 12,
     };
+    this.begin(setting);
     this.take(setting);
     this.camera.frame(this.look.boxBounds);
     this.scene.setMap(this.look.map);
@@ -32,12 +36,23 @@ class Viewer {
     if (setting.live) this.live = new Live((kind, content) => this.told(kind, content));
   }
 
+  /** Begins as the scene says that its pictures are drawn. */
+  begin({ picture, box: { min, max } }) {
+    if (!picture) return;
+    const { look } = this;
+    if (picture.obstacle) [look.obstacle, this.isJudged] = [picture.obstacle, true];
+    if (!picture.cut) return;
+    const { axis, at, below } = picture.cut;
+    look.cutting = { axis: "xyz"[axis], part: clamp((at - min[axis]) / (max[axis] - min[axis]), 0, 1), flipped: below, solid: true, fluid: false };
+  }
+
   /** Takes what is told of a scene besides its frames. */
   take(setting) {
     this.setting = setting;
     const { look } = this;
     this.values = new Map(setting.params.map(({ name, value }) => [name, value]));
     look.boxBounds = setting.box;
+    this.camera.stated = setting.picture;
     look.lattice = setting.lattice ?? setting.box;
     look.radius = setting.radius || 0;
     look.array = Math.min(look.array, Math.max(setting.arrays.length - 1, 0));
@@ -365,16 +380,21 @@ class Viewer {
     scene.moving = this.dragging || timeline.playing;
     // a param that the formula has no uniform for is seen in the mesh alone
     Object.assign(look, { time: frames?.from.time ?? 0, values: this.values, onlyMesh: this.isTried });
-    const poses = frames?.from.poses;
+    const { poses, mesh } = frames ? solidsBetween(frames) : {};
     const carried = poses ? this.carried : null;
-    scene.setMesh("solid", carried ?? this.meshes[frames?.from.mesh ?? 0] ?? null, this.live && !carried ? null : poses);
-    // some frames of a run may have none
-    look.lacksSurface = this.setting.has_surface && look.water !== "hidden" && frames?.from.surface === undefined;
-    scene.setMesh("water", this.surfaces[frames?.from.surface ?? -1] ?? null);
+    scene.setMesh("solid", carried ?? this.meshes[mesh ?? 0] ?? null, this.live && !carried ? null : poses);
+    // some frames of a run may have none, and what is not blended is that of the nearer one
+    const near = frames && (frames.part < 0.5 ? frames.from : frames.to);
+    look.lacksSurface = this.setting.has_surface && look.water !== "hidden" && near?.surface === undefined;
+    scene.setMesh("water", this.surfaces[near?.surface ?? -1] ?? null);
     const view = camera.view();
     const page = size.map((x) => x / ratio);
     const projection = camera.projection(page, look.free);
     look.ratio = ratio;
+    if (!this.isJudged && scene.solid && frames?.from.count > 0) {
+      this.isJudged = true;
+      if (scene.hiddenPart(look, view, projection, frames) > MOST_HIDDEN) byId("obstacle").value = look.obstacle = "transparent";
+    }
     scene.draw(look, view, projection, frames, timeline);
     const seen = { view, all: times(projection, view) };
     drawOverlay(overlay.getContext("2d"), size, ratio, look, camera, seen, null);
@@ -439,8 +459,9 @@ class Viewer {
   copyCamera() {
     const { canvas, look } = this;
     const text = this.camera.key(look.boxBounds, [canvas.clientWidth, canvas.clientHeight], this.free());
+    const said = text + besides(look, this.placeOf(look.cutting), this.scene.solid);
     const copied = navigator.clipboard?.writeText(text) ?? Promise.reject();
-    copied.then(() => this.state(`copied: ${text}`), () => this.state(text));
+    copied.then(() => this.state(`copied: ${said}`), () => this.state(said));
   }
 
   home() {

@@ -153,6 +153,38 @@ class Scene {
     if (this.solid && look.obstacle === "transparent") this.drawMesh("solid", look, view, projection, 0.3);
   }
 
+  /** The part of what is seen of the particles that the obstacle hides. */
+  hiddenPart(look, view, projection, frames) {
+    const gl = this.gl;
+    const [width, height] = [240, 180];
+    const [target, colours, depths] = [gl.createFramebuffer(), gl.createTexture(), gl.createRenderbuffer()];
+    gl.bindTexture(gl.TEXTURE_2D, colours);
+    gl.texImage2D(gl.TEXTURE_2D, 0, gl.RGBA8, width, height, 0, gl.RGBA, gl.UNSIGNED_BYTE, null);
+    gl.bindRenderbuffer(gl.RENDERBUFFER, depths);
+    gl.renderbufferStorage(gl.RENDERBUFFER, gl.DEPTH_COMPONENT24, width, height);
+    gl.bindFramebuffer(gl.FRAMEBUFFER, target);
+    gl.framebufferTexture2D(gl.FRAMEBUFFER, gl.COLOR_ATTACHMENT0, gl.TEXTURE_2D, colours, 0);
+    gl.framebufferRenderbuffer(gl.FRAMEBUFFER, gl.DEPTH_ATTACHMENT, gl.RENDERBUFFER, depths);
+    gl.viewport(0, 0, width, height);
+    gl.enable(gl.DEPTH_TEST);
+    gl.clearColor(0, 0, 0, 0);
+    const [seen, left] = [false, true].map((isBehind) => {
+      gl.clear(gl.COLOR_BUFFER_BIT | gl.DEPTH_BUFFER_BIT);
+      gl.colorMask(false, false, false, false);
+      if (isBehind) this.drawMesh("solid", { ...look, cutSolid: false }, view, projection, 1);
+      gl.colorMask(true, true, true, true);
+      this.drawPoints(look, view, projection, frames, height);
+      const pixels = new Uint8Array(4 * width * height);
+      gl.readPixels(0, 0, width, height, gl.RGBA, gl.UNSIGNED_BYTE, pixels);
+      return pixels.reduce((sum, value, k) => sum + (k % 4 === 3 && value > 0 ? 1 : 0), 0);
+    });
+    gl.bindFramebuffer(gl.FRAMEBUFFER, null);
+    gl.deleteFramebuffer(target);
+    gl.deleteTexture(colours);
+    gl.deleteRenderbuffer(depths);
+    return seen > 0 ? 1 - left / seen : 0;
+  }
+
   drawLines(look, view, projection) {
     const gl = this.gl;
     gl.useProgram(this.lines.program);
@@ -243,7 +275,7 @@ class Scene {
     gl.clear(gl.STENCIL_BUFFER_BIT);
   }
 
-  drawPoints(look, view, projection, { from, to, part }) {
+  drawPoints(look, view, projection, { from, to, part }, height = this.canvas.height) {
     const gl = this.gl;
     const { points } = this;
     // frames with other particles cannot be blended
@@ -269,10 +301,11 @@ class Scene {
     points.set("3f", "size", ...sub(look.lattice.max, look.lattice.min));
     points.set("1f", "part", next === from ? 0 : part);
     points.set("1f", "radius", look.radius);
-    points.set("1f", "height", this.canvas.height);
+    points.set("1f", "height", height);
     // balls that stand out of a plane would hide what is seen in it
-    const [nx, ny, nz, offset] = look.cutFluid ? look.cut : NO_CUT;
-    points.set("4f", "cut", nx, ny, nz, look.slice || (look.cutSolid && this.solid && look.obstacle === "opaque") ? offset - 1.1 * look.radius : offset);
+    const cut = look.cutFluid ? look.cut : NO_CUT;
+    const isSeen = cut !== NO_CUT && (look.slice || (look.cutSolid && this.solid && look.obstacle === "opaque"));
+    points.set("4f", "cut", ...cut.slice(0, 3), isSeen ? cut[3] - 1.1 * look.radius : cut[3]);
     points.set("2f", "tone", ...toneOf(from.ranges[look.array], look.range));
     gl.activeTexture(gl.TEXTURE0);
     gl.bindTexture(gl.TEXTURE_2D, this.map);

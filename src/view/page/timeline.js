@@ -8,6 +8,16 @@ const LEAST_BYTES = 1000;
 
 const bytesOf = (frame) => LEAST_BYTES + frame.count * (6 + frame.levels.length);
 
+const NO_POSE = [1, 0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0];
+
+/** The mesh of the solids between two frames and where its parts are then; those of the nearer one if it is another mesh. */
+function solidsBetween({ from, to, part }) {
+  if (from.mesh !== to.mesh || !(part > 0)) return part < 0.5 ? from : to;
+  const poses = Array.from({ length: Math.max(from.poses?.length ?? 0, to.poses?.length ?? 0) }, (_, k) =>
+    poseBetween(from.poses?.[k] ?? NO_POSE, to.poses?.[k] ?? NO_POSE, part));
+  return { mesh: from.mesh, poses };
+}
+
 /** The speeds of playback: simulated seconds per second. */
 const SPEEDS = [0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1, 2, 5, 10, 20, 50, 100];
 

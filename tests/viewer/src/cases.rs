@@ -9,6 +9,7 @@ use base64::prelude::BASE64_STANDARD;
 use crate::browser::Browser;
 use crate::exact;
 use crate::live;
+use crate::looks::{self, APPLY};
 use crate::pictures::{Picture, compare};
 use crate::program::{Viewer, rfm};
 use crate::shaders;
@@ -23,7 +24,7 @@ const RENDERED_HEIGHT: f64 = 4.692_309_429_472;
 pub struct Room {
     pub browser: Browser,
     pub folder: PathBuf,
-    shots: PathBuf,
+    pub shots: PathBuf,
 }
 
 type Case = fn(&mut Room);
@@ -39,6 +40,11 @@ pub const ALL: &[(&str, Case)] = &[
     ("a slice of ω, cut open there, follows its slider and the obstacle", slice),
     ("arrows and trails show where the fluid goes", motion),
     ("the camera is copied as `rfm render` and a scene read it", camera),
+    ("lines that go away from the eye meet as in `rfm render`", looks::perspective),
+    ("a page begins as the scene states it", looks::stated),
+    ("obstacles between frames are where they were then", looks::between_frames),
+    ("a container that hides the fluid begins transparent", looks::container),
+    ("particles of metres are seen beside an obstacle", looks::large),
     ("the page of a report opens from a file", report),
     ("small windows and both themes", windows),
     ("a hundred thousand particles", many),
@@ -101,7 +107,7 @@ impl Room {
         self.browser.eval("viewer.play(false)");
     }
 
-    fn place(&mut self, place: f64) {
+    pub fn place(&mut self, place: f64) {
         self.browser
             .eval(&format!("viewer.timeline.place = {place}; viewer.timelineChanged(); viewer.changed()"));
     }
@@ -150,7 +156,7 @@ fn handled(room: &mut Room) {
         "Input.dispatchMouseEvent",
         serde_json::json!({ "type": "mouseWheel", "x": 400, "y": 300, "deltaX": 0, "deltaY": -300 }),
     );
-    assert!(room.browser.number("viewer.camera.distance / viewer.camera.reach") < 3.0);
+    assert!(room.browser.number("viewer.camera.height / viewer.camera.reach") < 1.8);
     room.browser.key("h");
     assert!(room.shot("handled-home").difference(&first) < 0.2, "home restores the view");
 
@@ -480,11 +486,14 @@ fn camera(room: &mut Room) {
     assert_ne!(file, scene);
     std::fs::write(room.folder.join("seen.rfm"), scene).unwrap();
     rfm(&room.folder, &["check", "seen.rfm"]);
-    let room_height = room.browser.number(
-        "(() => { const free = viewer.free(), size = [viewer.canvas.clientWidth, viewer.canvas.clientHeight]; \
-         const lens = viewer.camera.projection(size, free)[5]; \
-         return (size[1] - free.top - free.bottom) * viewer.camera.distance / (0.5 * size[1] * lens); })()",
-    );
+    let room_height = room.browser.number(&format!(
+        "(() => {{ {APPLY} const free = viewer.free(), size = [viewer.canvas.clientWidth, viewer.canvas.clientHeight]; \
+         const {{ camera }} = viewer, lens = camera.projection(size, free), view = camera.view(), {{ up }} = camera.axes(); \
+         const at = (part) => {{ const [, y, , w] = apply(lens, apply(view, camera.target.map((x, k) => x + part * up[k]))); \
+         return 0.5 * size[1] * y / w; }}; return (size[1] - free.top - free.bottom) / (at(0.5) - at(-0.5)); }})()"
+    ));
+    let told = room.browser.eval("document.getElementById('state').textContent");
+    assert!(told.as_str().unwrap().contains("; beside it: --cut none"), "{told}");
     let zoom: f64 = key.rsplit_once("zoom: ").unwrap().1.trim_end_matches(" }").parse().unwrap();
     let rendered = room.browser.number(
         "viewer.camera.renderedHeight(viewer.look.boxBounds, viewer.camera.axes().towards, viewer.camera.target)",

@@ -7,6 +7,7 @@ mod browser;
 mod cases;
 mod exact;
 mod live;
+mod looks;
 mod pictures;
 mod program;
 mod shaders;
