@@ -79,11 +79,10 @@ pub(super) fn measure(solid: &Solid, finest: usize) -> Result<Vec<MeshFigures>, 
             let started = Instant::now();
             bar.set_message(format!("{}, {cells} cells", method.name()));
             let mut row = row(solid, method, cells, &grid)?;
-            if let Some(coarser) = rows.last().filter(|r| r.method == row.method && 2 * r.cells == cells) {
-                if let (Some(coarse), Some(fine)) = (coarser.quality.0, row.quality.0) {
-                    row.order = order(coarse.hausdorff(), fine.hausdorff());
-                    row.order_rms = order(coarse.to_surface.rms, fine.to_surface.rms);
-                }
+            let coarser = rows.last().filter(|r| r.method == row.method && 2 * r.cells == cells);
+            if let (Some(coarse), Some(fine)) = (coarser.and_then(|row| row.quality.0), row.quality.0) {
+                row.order = order(coarse.hausdorff(), fine.hausdorff());
+                row.order_rms = order(coarse.to_surface.rms, fine.to_surface.rms);
             }
             rows.push(row);
             bar.inc(1);
