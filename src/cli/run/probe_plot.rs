@@ -296,7 +296,7 @@ mod tests {
     fn numbers_that_differ_in_late_digits_are_counted_from_the_lowest() {
         let probe = Probe::Pressure { at: glam::DVec3::ZERO };
         let svg = drawn("p", &probe, "time\n0,1.350624e-7\n1,1.3506241e-7\n2,1.3506242e-7\n", None);
-        assert!(svg.contains(">pressure − 1.350624"), "{svg}");
+        assert!(svg.contains(">pressure − 1.35062398e-7, Pa<"), "{svg}");
         let labels = svg.split("text-anchor=\"end\">").skip(1).map(|rest| rest.split('<').next().unwrap());
         let longest = labels.map(|label| label.chars().count()).max().unwrap();
         assert!(longest <= 9, "{svg}");
