@@ -181,7 +181,7 @@ it silently. A fold whose variable is not used has many equal members.";
 EMPTY_SOLID = "W0402":
 "Interval arithmetic proves that ω is nowhere positive: the solid is empty, its mesh has no triangles and nothing ever
 collides with it. If the message says that the solid *may be* empty, that is not proven: `check` found no part of it on
-its grid, and far thinner parts, as a plate 5 µm thick whose sides of 1 lack their unit mm, are not looked for between the nodes.";
+its grid, nor along lines, and a thread of 5 µm whose length of 1 lacks its unit mm is met by few of them.";
 UNBOUNDED_SOLID = "W0403":
 "The solid could not be proven to end towards the sides that the message names: it cannot be meshed over its own
 bounds. If one member of a union is to blame, the message marks it. Intersect it with a box, or mesh it over a scene's

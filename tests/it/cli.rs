@@ -254,7 +254,7 @@ fn a_budget_below_a_second_is_compared_as_it_is_and_a_missing_volume_is_explaine
     assert!(little.stderr.contains("measuring it may take 0.0"), "{}", little.stderr);
     let why = little.json()["solids"][0]["no_volume"].as_str().unwrap().to_string();
     assert!(why.contains("--budget 0.0"), "{why}");
-    let thread = "rfm 1\nsolid s = box([0, 0, 0], [10, 0.001, 0.001])\n".as_bytes();
+    let thread = "rfm 1\nsolid s = box([0, 0, 0], [10, 1e-7, 1e-7]).rotate_z(0.5).rotate_x(0.4)\n".as_bytes();
     let solid = rfm_reading(root(), &["check", "--json", "-"], thread).expect(0).json()["solids"][0].clone();
     assert!(
         solid["volume"].is_null() && solid["no_volume"].as_str().unwrap().contains("too thin"),
@@ -581,7 +581,8 @@ fn one_document_or_none() {
     let mixed =
         rfm_reading(root(), &["check", "-"], b"rfm 1\nsolid s = box([0, 0, 0], [10 mm, 20 mm, 5])").expect(0);
     assert!(mixed.stdout.contains("along z it is 500 times as long as along x"), "{}", mixed.stdout);
-    let thin = b"rfm 1\nsolid s = sphere(1) and -1e-4 <= x + y + 0.7*z - 0.0123 <= 1e-4";
+    // a thread that neither cells nor lines meet
+    let thin = b"rfm 1\nsolid s = box([0, 0, 0], [10, 1e-7, 1e-7]).rotate_z(0.5).rotate_x(0.4)";
     let thin = rfm_reading(root(), &["check", "-", "--json"], thin).expect(0).json();
     assert_eq!((&thin["solids"][0]["empty"], &thin["solids"][0]["volume"]), (&false.into(), &().into()));
 }

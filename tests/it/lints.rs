@@ -445,12 +445,17 @@ fn a_solid_that_is_next_to_nothing_does_not_hide_the_others() {
 }
 
 #[test]
-fn a_volume_that_is_no_number_is_not_called_thin() {
+fn a_volume_that_is_no_number_is_not_called_thin_and_one_of_a_thin_sheet_is_found() {
     let text = b"rfm 1\nsolid s = box([0, 0, 0], [1, 1, 1]) and log10(x) <= 0\n";
     let said = rfm_reading(root(), &["check", "-"], text).expect(0).stdout;
     assert!(said.contains("volume      not found: the field is not a number at (-"), "{said}");
     assert!(!said.contains("thin"), "{said}");
     let sheet = b"rfm 1\nsolid s = box([0, 0, 0], [1, 1, 1]) and abs(x + y + z - 1.234) <= 1e-5\n";
-    let said = rfm_reading(root(), &["check", "-"], sheet).expect(0).stdout;
-    assert!(said.contains("volume      not found: it is empty, or too thin for 96 cells"), "{said}");
+    let said = rfm_reading(root(), &["check", "--json", "-"], sheet).expect(0).json();
+    // the density of a sum of three numbers from 0 to 1, times the width of the sheet
+    let s = 1.234_f64;
+    let exact = 2e-5 * 0.5 * (-2.0 * s * s + 6.0 * s - 3.0);
+    let figure = |key: &str| said["solids"][0][key].as_f64().unwrap();
+    assert!((figure("volume") - exact).abs() <= figure("volume_error"), "{said} {exact}");
+    assert!(figure("volume_error") < 0.01 * exact && figure("lines") > 0.0, "{said}");
 }

@@ -6,6 +6,7 @@ use rfm::mesh::{Grid, Mesh, Resolution, ThinCells, Unwatched, marching_cubes, th
 use rfm::{Engine, Program, Solid};
 
 use crate::random::Random;
+use crate::tool::{rfm_reading, root};
 
 fn solid(text: &str) -> Solid {
     let program = Program::from_source("t.rfm", format!("rfm 1\nsolid s = {text}"));
@@ -219,4 +220,24 @@ fn wedges_are_told_from_walls() {
     let both = "polygon([[0, 0], [1, 0], [1, 0.577]]).extrude(0, 1) or box([0, 1, 0], [1, 1.003, 1])";
     let (_, both) = looked_at(&solid(both), 48);
     assert!(!both.is_wedge && (both.thickness - 0.003).abs() < 1e-6, "{both:?}");
+}
+
+/// The search for thin parts follows slopes, and a choice has none where it jumps. What lines do not confirm is no
+/// figure of `check`, and what they do not meet is within its error.
+#[test]
+fn what_a_choice_cuts_out_is_measured_within_the_error() {
+    for (solid, exact) in [
+        ("if abs(x - 0.3) <= 0.004 then -1 else box([-1, -1, -1], [1, 1, 1])", 8.0 - 0.008 * 4.0),
+        ("box([-1, -1, -1], [1, 1, 1]) and 1 - 2*(step(0.1, x) - step(0.102, x)) >= 0", 8.0 - 0.002 * 4.0),
+        (
+            "if (x - 0.3)^2 + (y - 0.2)^2 <= 0.04^2 then -1 else box([-1, -1, -1], [1, 1, 1])",
+            8.0 - 2.0 * std::f64::consts::PI * 0.04 * 0.04,
+        ),
+    ] {
+        let text = format!("rfm 1\nsolid s = {solid}\n");
+        let found = rfm_reading(root(), &["check", "--json", "-"], text.as_bytes()).expect(0).json();
+        let figure = |key: &str| found["solids"][0][key].as_f64().unwrap();
+        let off = (figure("volume") - exact).abs();
+        assert!(off <= figure("volume_error") && figure("volume_error") < 0.01, "{found}, {exact}");
+    }
 }

@@ -22,7 +22,8 @@ pub(super) struct Facts {
     pub empty: bool,
     pub bounds: Option<Box3>,
     pub volume: Option<f64>,
-    /// Estimated from three resolutions; what rounding may add for a solid that is a mesh alone.
+    /// Estimated from three resolutions, or from sets of lines; what rounding may add for a solid that is a mesh alone.
+    /// Null if meshes do not show all of the solid and lines have not measured it.
     pub volume_error: Option<f64>,
     pub area: Option<f64>,
     /// As that of the volume.
@@ -30,8 +31,9 @@ pub(super) struct Facts {
     /// Those of the solid: one that is hollow is one, although its surface has two.
     pub components: Option<usize>,
     /// Whether two resolutions have as many components, and no part but the edges of wedges is too thin for the cells
-    /// with which the volume was measured. If not, the volume, the area and their errors are those of what the finer
-    /// one shows. `None` if the search for such parts was ended.
+    /// with which the volume was measured. If not, the components are those of what the finer one shows, and so are
+    /// the volume, the area and their errors unless `lines` says that lines have found them. `None` if the search for
+    /// such parts was ended.
     pub resolved: Option<bool>,
     /// The tolerance for the error of ω that the file states, the program that keeps it, and the program's
     /// certified bound.
@@ -43,8 +45,12 @@ pub(super) struct Facts {
     /// The number of cells of the finer grid in which parts of the surface hide, see `mesh::thin_cells`.
     pub thin_cells: Option<usize>,
     /// The cells along the longest side of the finest grid that the volume and the area were measured on: more than
-    /// the usual ones where the solid is too thin for these. Null if there was no need of a grid, or no volume.
+    /// the usual ones where the solid is too thin for these. Null if there was no need of a grid, or no volume
+    /// on one.
     pub cells: Option<usize>,
+    /// The number of lines that the volume and the area were measured along, because cells do not show its thin parts.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub lines: Option<usize>,
     /// What was not finished within the budget: `volume` (and area), `thin_cells`.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub unfinished: Vec<&'static str>,
@@ -87,6 +93,7 @@ impl Facts {
             time: solid.moves().then(|| solid.time()),
             thin_cells: None,
             cells: None,
+            lines: None,
             unfinished: Vec::new(),
             components_coarser: None,
             wants_time: false,
@@ -157,16 +164,15 @@ fn print_solid(solid: &Facts) {
     } else if !solid.empty {
         say!("    bounds      none found");
     }
-    // the error is found from three grids, which all miss what is not resolved
-    let measured = |value: f64, error: f64| match solid.resolved {
-        Some(false) => format!("{}, not resolved", significant(value, 3)),
-        Some(true) | None => format!("{} ± {error:.1e}", significant(value, 6)),
+    let measured = |value: f64, error: Option<f64>| match error {
+        Some(error) => format!("{} ± {error:.1e}", significant(value, 6)),
+        None => format!("{}, not resolved", significant(value, 3)),
     };
-    if let (Some(volume), Some(error), false) = (solid.volume, solid.volume_error, solid.empty) {
-        say!("    volume      {}", measured(volume, error));
+    if let (Some(volume), false) = (solid.volume, solid.empty) {
+        say!("    volume      {}", measured(volume, solid.volume_error));
     }
-    if let (Some(area), Some(error), false) = (solid.area, solid.area_error, solid.empty) {
-        say!("    area        {}", measured(area, error));
+    if let (Some(area), false) = (solid.area, solid.empty) {
+        say!("    area        {}", measured(area, solid.area_error));
     }
     if let (Some(components), Some(coarser), false) =
         (solid.components, solid.components_coarser, solid.empty)
@@ -182,18 +188,23 @@ fn print_solid(solid: &Facts) {
             ),
         }
     }
-    match solid.cells {
-        Some(cells) if cells > VOLUME_CELLS => {
-            let uneven = solid.uneven_sides.as_deref().unwrap_or_default();
+    let uneven = solid.uneven_sides.as_deref().unwrap_or_default();
+    match (solid.cells, solid.lines) {
+        (_, Some(lines)) => {
+            say!(
+                "    measured    along {lines} lines, which find what {VOLUME_CELLS} cells do not show{uneven}"
+            )
+        }
+        (Some(cells), None) if cells > VOLUME_CELLS => {
             say!("    measured    with {cells} cells along its longest side{uneven}")
         }
-        Some(_) => {}
-        None if solid.volume.is_some() && !solid.empty => {
+        (Some(_), None) => {}
+        (None, None) if solid.volume.is_some() && !solid.empty => {
             say!("    measured    by the triangles of its mesh")
         }
-        None => {}
+        (None, None) => {}
     }
-    if solid.resolved == Some(false) {
+    if solid.resolved == Some(false) && solid.lines.is_none() {
         say!("    not resolved: volume, area and components are those of what {VOLUME_CELLS} cells show");
     }
     if let (Some(name), Some(bound), Some(tolerance)) = (&solid.program, solid.error_bound, solid.tolerance) {

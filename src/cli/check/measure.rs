@@ -1,4 +1,5 @@
-//! Measures a solid: its volume and area on meshes, and what is too thin for their cells.
+//! Measures a solid: its volume and area on meshes, what is too thin for their cells, and volume and area along lines
+//! where something is.
 
 use super::facts::{Box3, Facts, RESOLUTION, VOLUME_CELLS};
 use crate::cli::failure::Failure;
@@ -7,7 +8,7 @@ use rfm::field::Field;
 use rfm::geom::{Aabb, to_thousandths};
 use rfm::glam::DVec3;
 use rfm::interval::Interval;
-use rfm::mesh::{self, Grid, Mesh, MeshError, Resolution, ThinCells, Volume, VolumeError, Watch};
+use rfm::mesh::{self, ByLines, Grid, Mesh, MeshError, Resolution, ThinCells, Volume, VolumeError, Watch};
 use rfm::solid::Bounds;
 
 /// Boxes along each side of a solid in which its range is tried; one in `MOST_UNKNOWN` of them may be
@@ -67,6 +68,9 @@ pub(super) fn measure(
     if by_meshes == ByMeshes::Impossible {
         return Ok((facts, ThinCells::NONE));
     }
+    let by_lines = || mesh::by_lines(&*surface, bounds, watch);
+    // the search for thin parts follows slopes, of which a choice has none, and takes the longer for it
+    let of_choices = (solid.may_choose() && knows_ranges(solid, grid.bounds())).then(by_lines).flatten();
     let thin = thin_cells(solid, &*surface, &grid, watch, notes);
     tell_of_end(solid, thin, &mut facts, notes);
     if let (Some(solids), Some(coarser)) = (facts.components, facts.components_coarser) {
@@ -78,12 +82,26 @@ pub(super) fn measure(
     // of a plate that lies between the nodes nothing is seen, but the search may have found it
     let is_hidden =
         by_meshes == ByMeshes::ShowNothing && thin.is_some_and(|thin| thin.count > 0 && !thin.ended);
+    // a sheet or a wire, of which cells show little or nothing, is crossed by lines
+    let hides_parts = facts.resolved != Some(true) && thin.is_some_and(|thin| thin.count > 0);
+    let shows_nothing = by_meshes == ByMeshes::ShowNothing && thin.is_some();
+    let lines = of_choices.or_else(|| (hides_parts || shows_nothing).then(by_lines).flatten());
+    if let Some(found) = &lines {
+        match hides_parts || !agree(found, &facts) {
+            true => take_by_lines(found, bounds, &mut facts),
+            false => trust_no_more_than(found, &mut facts),
+        }
+    }
     if let Some(thin) = thin.filter(|_| facts.resolved == Some(false) || is_hidden) {
-        refine((solid, &*surface, bounds), (&grid, thin), watch, (&mut facts, notes));
+        refine((solid, &*surface, bounds), (&grid, thin), lines.as_ref(), watch, (&mut facts, notes));
+    }
+    if facts.resolved == Some(false) && facts.lines.is_none() {
+        // three grids may agree about what all of them miss
+        (facts.volume_error, facts.area_error) = (None, None);
     }
     // a part too thin for a cell would have been found
     facts.shows_nothing =
-        by_meshes == ByMeshes::ShowNothing && thin.is_some_and(|thin| thin.count == 0 && !thin.ended);
+        shows_nothing && lines.is_none() && thin.is_some_and(|thin| thin.count == 0 && !thin.ended);
     Ok((facts, thin.unwrap_or(ThinCells::NONE)))
 }
 
@@ -146,7 +164,8 @@ fn by_meshes(
     Ok(ByMeshes::Measured)
 }
 
-/// What there is to ask of bounds with a side that is far longer than another, as in `box([0, 0, 0], [10 mm, 20 mm, 5])`.
+/// What there is to ask of bounds with a side that is far longer than another, as in
+/// `box([0, 0, 0], [10 mm, 20 mm, 5])`.
 fn uneven_sides(bounds: &Aabb) -> Option<String> {
     let sides = bounds.size();
     let ratio = sides.max_element() / sides.min_element();
@@ -166,6 +185,7 @@ fn take(found: &Volume, bounds: &Aabb, cells: usize, facts: &mut Facts) {
     let excess = (found.extent.min - bounds.min).max(bounds.max - found.extent.max);
     facts.are_loose = excess.max_element() > hidden;
     facts.no_volume = None;
+    facts.lines = None;
     facts.cells = Some(cells);
     facts.volume = Some(found.volume);
     facts.volume_error = Some(found.error);
@@ -173,6 +193,34 @@ fn take(found: &Volume, bounds: &Aabb, cells: usize, facts: &mut Facts) {
     facts.area_error = Some(found.area_error);
     facts.components = Some(found.solids);
     facts.components_coarser = Some(found.solids_coarser);
+}
+
+/// The figures that lines have found. Components are those of the cells, if they show any.
+fn take_by_lines(found: &ByLines, bounds: &Aabb, facts: &mut Facts) {
+    facts.no_volume = None;
+    facts.lines = Some(found.lines);
+    facts.cells = None;
+    facts.volume = Some(found.volume);
+    facts.volume_error = Some(found.error);
+    facts.area = Some(found.area);
+    facts.area_error = Some(found.area_error);
+    facts.resolved = Some(false);
+    facts.uneven_sides = uneven_sides(bounds);
+}
+
+/// Whether the volume of meshes is that of the lines, within the errors of both.
+fn agree(found: &ByLines, facts: &Facts) -> bool {
+    facts.volume.zip(facts.volume_error).is_some_and(|(volume, error)| confirms(found, volume, error))
+}
+
+fn confirms(lines: &ByLines, volume: f64, error: f64) -> bool {
+    (volume - lines.volume).abs() <= error + lines.error
+}
+
+/// Makes errors as large as those of the lines: what they do not meet, meshes may not show either.
+fn trust_no_more_than(found: &ByLines, facts: &mut Facts) {
+    facts.volume_error = facts.volume_error.map(|error| error.max(found.error));
+    facts.area_error = facts.area_error.map(|error| error.max(found.area_error));
 }
 
 /// The figures of a solid whose surface is a list of triangles.
@@ -206,10 +254,12 @@ fn tell_of_end(solid: &Solid, thin: Option<ThinCells>, facts: &mut Facts, notes:
     facts.thin_cells = thin.filter(|thin| !thin.ended).map(|thin| thin.count);
 }
 
-/// Measures a solid again with the cells that its thin parts need. If these show all of it, their figures are taken.
+/// Measures a solid again with the cells that its thin parts need. If these show all of it, and lines do not
+/// contradict them, their figures are taken.
 fn refine(
     (solid, surface, bounds): (&Solid, &dyn Field, &Aabb),
     (grid, thin): (&Grid, ThinCells),
+    lines: Option<&ByLines>,
     watch: &dyn Watch,
     (facts, notes): (&mut Facts, &mut Vec<String>),
 ) {
@@ -238,7 +288,10 @@ fn refine(
             continue;
         }
         match mesh::volume(surface, bounds, cells, watch) {
-            Ok(found) if found.solids == found.solids_coarser => {
+            Ok(found)
+                if found.solids == found.solids_coarser
+                    && lines.is_none_or(|lines| confirms(lines, found.volume, found.error)) =>
+            {
                 take(&found, bounds, cells, facts);
                 facts.resolved = Some(true);
                 facts.uneven_sides = uneven_sides(bounds);
@@ -247,7 +300,7 @@ fn refine(
                 facts.wants_time = true;
                 notes.push(no_time);
             }
-            // the figures of the usual cells stay
+            // the figures of the usual cells, or of lines, stay
             Ok(_) | Err(_) => {}
         }
         return;

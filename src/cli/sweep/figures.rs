@@ -123,7 +123,7 @@ fn of_solids(document: &Value) -> Vec<Figure> {
             _ => String::new(),
         };
         let mut figures = keys(solid, &prefix, &["volume", "area", "components", RESOLVED]);
-        let resolved = solid[RESOLVED] != Value::Bool(false);
+        let resolved = solid[RESOLVED] != Value::Bool(false) || solid["lines"].is_u64();
         for (key, error) in [("volume", "volume_error"), ("area", "area_error")] {
             if let Some(figure) = figures.iter_mut().find(|figure| figure.name == format!("{prefix}{key}")) {
                 figure.unresolved = !resolved;

@@ -63,6 +63,22 @@ const EVALUATIONS_OF_LOOK: usize = 10;
 const SUDDEN: f64 = 1e6;
 
 impl Solid {
+    /// Whether ω may jump because its formula chooses between values, as `if`, `where` and `step` do. The whole
+    /// numbers of `floor` and `mod`, of which copies are made, are not meant.
+    pub fn may_choose(&self) -> bool {
+        let (graph, node) = self.formula();
+        let (cone, _) = graph.extract_cone(node);
+        cone.exprs().iter().any(|expr| match expr {
+            Expr::Unary(op, _) => *op == Unary::Sign,
+            Expr::Binary(op, ..) => *op == Binary::MulOrZero,
+            Expr::Constant(_)
+            | Expr::Coordinate(_)
+            | Expr::Parameter(_)
+            | Expr::Uniform(_)
+            | Expr::Lookup(..) => false,
+        })
+    }
+
     /// The operations that make ω jump across its surface, in a box.
     pub fn jumps(&self, over: &Aabb) -> Vec<Break> {
         let Some(formula) = Formula::of(self) else { return Vec::new() };

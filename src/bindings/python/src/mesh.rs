@@ -13,7 +13,8 @@ use rfm::field::Field;
 use rfm::geom::Aabb;
 use rfm::glam::DVec3;
 use rfm::mesh::{
-    self, FORMATS, Grid, LengthUnit, Mesh, MeshError, Report, Resolution, dual_contouring, marching_cubes,
+    self, FORMATS, Grid, LengthUnit, Mesh, MeshError, Report, Resolution, VolumeError, dual_contouring,
+    marching_cubes,
 };
 use rfm::solid::Bounds;
 use rfm::view;
@@ -33,10 +34,11 @@ pub fn mesher(method: &str) -> PyResult<Mesher> {
     }
 }
 
-/// The volume of a solid, m³.
+/// The volume of a solid, m³: on meshes with so many cells along the longest side, or along lines if it is too thin
+/// for any of them.
 ///
 /// # Errors
-/// `RfmError` if no box around the solid is known, or if it cannot be meshed.
+/// `RfmError` if no box around the solid is known, if it cannot be meshed, or if neither meshes nor lines show it.
 pub fn volume(solid: &Solid, cells: usize, watch: &Watch) -> PyResult<f64> {
     let bounds = match solid.bounds() {
         Bounds::Within(bounds) => bounds,
@@ -44,7 +46,13 @@ pub fn volume(solid: &Solid, cells: usize, watch: &Watch) -> PyResult<f64> {
         Bounds::Unbounded => return Err(refused(unbounded(solid))),
     };
     let surface = solid.surface(bounds.grown(0.1 * bounds.size().max_element()));
-    mesh::volume(&*surface, bounds, cells, watch).map(|found| found.volume).map_err(refused)
+    match mesh::volume(&*surface, bounds, cells, watch) {
+        Ok(found) => Ok(found.volume),
+        Err(error @ VolumeError::TooThin) => {
+            mesh::by_lines(&*surface, bounds, watch).map(|found| found.volume).ok_or_else(|| refused(error))
+        }
+        Err(error) => Err(refused(error)),
+    }
 }
 
 fn unbounded(solid: &Solid) -> String {

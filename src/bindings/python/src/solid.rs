@@ -514,7 +514,8 @@ impl PySolid {
         Self::new(self.program.bind(py), self.solid.clone(), self.stretch, Some(aabb(r#box)?))
     }
 
-    /// The volume, m³, found on meshes with `cells` cells, two thirds and half as many along the longest side.
+    /// The volume, m³, found on meshes with `cells` cells, two thirds and half as many along the longest side. A sheet
+    /// too thin for these is measured along lines that cross it.
     ///
     /// Parameters
     /// ----------

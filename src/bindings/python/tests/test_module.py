@@ -64,6 +64,11 @@ def test_meshes_are_arrays(pawn, tmp_path):
     assert (tmp_path / "text.stl").read_text().startswith("solid rfm")
 
 
+def test_a_sheet_too_thin_for_cells_has_its_volume():
+    sheet = rfm.load("rfm 1\nsolid sheet = box([0, 0, 0], [10, 10, 0.01])\n")["sheet"]
+    assert sheet.volume() == pytest.approx(1.0, rel=2e-3)
+
+
 @pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="no pipes with names here")
 def test_a_mesh_takes_the_place_of_no_pipe_and_no_link(pawn, tmp_path):
     mesh, pipe, link = pawn.mesh(16), tmp_path / "pipe.stl", tmp_path / "link.stl"
