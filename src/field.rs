@@ -20,7 +20,7 @@ pub(crate) use cut::{Cut, cut, is_inside};
 pub use faces::{Face, Faces, Part};
 pub(crate) use faces::{standing_faces, surface_face};
 pub use path::{Entry, Normals, Path, last_outside};
-pub(crate) use region::{Region, is_flat};
+pub(crate) use region::{Everywhere, Region, is_flat};
 pub(crate) use walls::clearance_by_ranges;
 pub use walls::{Moving, Still, Walls, search_path};
 

@@ -63,7 +63,7 @@ pub(super) struct Filling {
     pub mass: f64,
     /// Volume of the fluid's shape in the box and outside all bodies, m³; `None` if it does not count.
     pub volume: Option<f64>,
-    /// Whether that is all the room that there is, for a fluid that must not be compressed.
+    /// Whether that is all the room that there is around it, for a fluid that must not be compressed.
     pub fills_vessel: bool,
 }
 
@@ -126,7 +126,8 @@ impl Experiment {
             return as_stated();
         }
         // other methods do not ask, and many bodies take time
-        let fills_vessel = self.parameters.keeps_density() && self.free_volume(0.0) < LEAST_ROOM * volume;
+        let fills_vessel =
+            self.parameters.keeps_density() && self.has_no_more_room(&within, LEAST_ROOM * volume);
         let alone = Region { shape: &*shape, bodies: Vec::new(), within }.volume();
         let taken = (alone - volume).max(0.0);
         let (mut particles, mut carved, cell) = self.fit(obstacles, within, volume, taken)?;

@@ -20,6 +20,7 @@ mod every;
 mod fall;
 mod filling;
 mod fingerprint;
+mod free_surface;
 mod layers;
 mod mean;
 mod misfits;
@@ -113,7 +114,7 @@ impl Experiment {
         let mut parameters = parameters::of_scene(&program, &scene, mass, typical_speed);
         let mut method = scene.method;
         let wholes = || parts.iter().map(|part| &part.whole);
-        let has_surface = || room::has_surface(&scene, &fluid, wholes(), parameters.spacing());
+        let has_surface = || free_surface::has_surface(&scene, &fluid, wholes(), parameters.spacing());
         method.settle(&has_surface);
         let clamped = parameters::clamped(&scene, &method, &has_surface);
         let scene = Scene { method, ..scene };

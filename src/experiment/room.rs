@@ -6,7 +6,7 @@ use super::{Body, Experiment, refuse};
 use crate::Solid;
 use crate::compile::Error;
 use crate::diagnostic::{Code, Diagnostic, Span};
-use crate::field::{Field, Region, Walls, is_flat};
+use crate::field::{Everywhere, Field, Region, Walls, is_flat};
 use crate::geom::{Aabb, to_thousandths};
 use crate::lower::Scene;
 use crate::solid::Bounds;
@@ -18,32 +18,11 @@ const SAMPLES: f64 = 40.0;
 /// Number of halvings that find the border of an empty slab, to a part in 10¹² of the box.
 const HALVINGS: usize = 40;
 
-/// Steps from one sample to the next, in parts of a box: the powers 1 to 3 of the inverse of x⁴ = x + 1, whose
-/// multiples fill a box evenly, along each side too, however flat it is (Roberts 2018).
-const SPREAD: DVec3 = DVec3::new(0.819_172_513_396_164_4, 0.671_043_606_703_789_3, 0.549_700_477_901_970_3);
-
-/// Samples in the room of a scene that show for certain whether it is full, and those that will do where it is a
-/// small part of its box, of which there are no more than the last number.
-const ENOUGH_SAMPLES: f64 = 4096.0;
-const LEAST_SAMPLES: f64 = 1000.0;
-const MOST_SAMPLES: u32 = 1 << 18;
-
-/// Standard deviations by which the dry samples are too many for a fluid without a surface, so that no more are
-/// taken.
-const CERTAIN: f64 = 5.0;
-
-/// Later instants, s, at which it is looked whether bodies that move leave room free, or take some: from the first to
-/// the last, each by the same factor later than the one before, so that no period hides. They do not depend on the
-/// run, which may be continued to a later end with the same method.
-const LATER: [f64; 2] = [0.01, 100.0];
-const INSTANTS: i32 = 24;
-
-/// A room for fewer particles is no full one: gaps of one particle are all there is, and differences of pressure
-/// fling particles through them.
-const FEWEST: f64 = 200.0;
-
 /// If the room of a scene is at least this many times the volume of its fluid, the fluid has a surface.
 pub(super) const LEAST_ROOM: f64 = 1.03;
+
+/// How far room is looked for around a fluid, over its longest side.
+const AROUND: f64 = 0.25;
 
 /// The least part of a fluid outside the box that is worth a warning: less is an edge between samples.
 const PART_OUTSIDE: f64 = 0.02;
@@ -253,10 +232,21 @@ impl Experiment {
                 };
                 Diagnostic::error(Code::OBSTACLE_FILLS_BOX, fluid.shape_span, message).help(help)
             }
-            SeedError::NoCount
-            | SeedError::Jitter(_)
-            | SeedError::TooLarge { .. }
-            | SeedError::Undefined { .. } => no_room(at, error.to_string()),
+            SeedError::Undefined { at } => {
+                // the fluid, or one of the bodies that are asked where it is
+                let obstacles = self.bodies.iter().skip(usize::from(self.scene.container.is_some()));
+                let culprit = (obstacles.zip(&self.scene.obstacles))
+                    .find(|(body, _)| !body.solid.omega(*at).is_finite())
+                    .filter(|_| self.fluid.omega(*at).is_finite());
+                let (whose, span) = match culprit {
+                    Some((_, obstacle)) => (format!("obstacle `{}`", obstacle.name), obstacle.span),
+                    None => ("a shape".to_string(), fluid.shape_span),
+                };
+                no_room(span, format!("the formula of {whose} has no value at {}", to_thousandths(*at)))
+            }
+            SeedError::NoCount | SeedError::Jitter(_) | SeedError::TooLarge { .. } => {
+                no_room(at, error.to_string())
+            }
         };
         refuse(&self.program, diagnostic)
     }
@@ -353,17 +343,29 @@ impl Experiment {
         region.volume() * held / all
     }
 
-    /// The part of the box, m³, that no body takes at a time, s, found by samples.
-    pub fn free_volume(&self, time: f64) -> f64 {
+    /// Whether bodies leave so much of the box around a fluid free at a time, s: a volume, m³. The fluid lies within
+    /// the given box. Returns what they leave, if it is less. Samples answer for most scenes, but they miss a narrow
+    /// vessel.
+    pub fn lacks_room(&self, fluid: &Aabb, time: f64, needed: f64) -> Option<f64> {
         let bodies: Vec<_> = self.bodies.iter().map(|body| body.solid.at(time)).collect();
-        let bodies = Crowd::of(bodies.iter());
-        let domain = self.scene.domain;
-        let (mut free, mut all) = (0.0, 0.0);
-        for at in samples(&domain) {
-            all += 1.0;
-            free += f64::from(u8::from(bodies.is_free(at)));
+        let within = self.around(fluid);
+        if sampled(&bodies, &within) >= needed {
+            return None;
         }
-        domain.volume() * free / all
+        Some(free_of(&bodies, within)).filter(|free| *free < needed)
+    }
+
+    /// Whether bodies leave no more of the box at the start than so much, m³: neither around a fluid within the given
+    /// box, nor farther away, as behind a neck.
+    pub(super) fn has_no_more_room(&self, fluid: &Aabb, than: f64) -> bool {
+        let bodies: Vec<_> = self.bodies.iter().map(|body| body.solid.clone()).collect();
+        free_of(&bodies, self.around(fluid)) < than && sampled(&bodies, &self.scene.domain) < than
+    }
+
+    /// The part of the box that lies so near to a fluid within some bounds that it shows whether the fluid has room.
+    fn around(&self, fluid: &Aabb) -> Aabb {
+        let margin = (AROUND * fluid.size().max_element()).max(2.0 * self.parameters.spacing());
+        fluid.grown(margin).intersection(&self.scene.domain)
     }
 
     /// How many particles the scene has at its start, found by samples and without placing any of them.
@@ -469,7 +471,8 @@ pub fn taken_by_obstacles(fluid: &Solid, obstacles: &[Solid], domain: &Aabb) -> 
     Some(Taken { part: taken / all, is_all: taken == all && free() == 0.0 })
 }
 
-/// A field with the signs and the surface of a solid in a box, which for a solid of many parts costs less than ω itself.
+/// A field with the signs and the surface of a solid in a box, which for a solid of many parts costs less than ω
+/// itself.
 pub(super) fn quick_field(solid: &Solid, over: Aabb) -> Box<dyn Walls> {
     if solid.has_many_leaves() { solid.surface(over) } else { Box::new(solid.clone()) }
 }
@@ -480,6 +483,24 @@ pub(super) fn quick_fields<'s>(
     over: Aabb,
 ) -> Vec<Box<dyn Walls>> {
     solids.into_iter().map(|solid| quick_field(solid, over)).collect()
+}
+
+/// The part of a box, m³, that no body takes.
+fn free_of(bodies: &[Solid], within: Aabb) -> f64 {
+    let quick = quick_fields(bodies, within);
+    let bodies = quick.iter().map(|field| &**field as &dyn Field).collect();
+    Region { shape: &Everywhere, bodies, within }.volume()
+}
+
+/// [`free_of`], found by samples.
+fn sampled(bodies: &[Solid], within: &Aabb) -> f64 {
+    let crowd = Crowd::of(bodies.iter());
+    let (mut free, mut all) = (0.0, 0.0);
+    for at in samples(within) {
+        all += 1.0;
+        free += f64::from(u8::from(crowd.is_free(at)));
+    }
+    within.volume() * free / all
 }
 
 /// A count with two digits, rounded down.
@@ -499,72 +520,6 @@ pub(super) fn samples(region: &Aabb) -> impl Iterator<Item = DVec3> + use<> {
         let (i, j, k) = (index % nx, index / nx % ny, index / (nx * ny));
         min + cell * (DVec3::new(i as f64, j as f64, k as f64) + 0.5)
     })
-}
-
-/// Whether the fluid has a free surface: whether it leaves room free, or bodies that move change the room. Found by
-/// samples; if too few of them lie in the room, or too few particles of the given spacing, m, have a place there, it
-/// counts as having one.
-pub(super) fn has_surface<'a>(
-    scene: &Scene,
-    fluid: &Solid,
-    bodies: impl Iterator<Item = &'a Solid>,
-    spacing: f64,
-) -> bool {
-    if scene.fluid.particles.is_some() && scene.fluid.size_span.is_some() {
-        // that many particles of that size need not fill the shape
-        return true;
-    }
-    let (moving, still): (Vec<&Solid>, Vec<&Solid>) = bodies.partition(|body| body.moves());
-    let now = all_at(&moving, 0.0);
-    let (still, now) = (Crowd::of(still.into_iter()), Crowd::of(now.iter()));
-    let (min, size) = (scene.domain.min, scene.domain.size());
-    let places = (1..=MOST_SAMPLES).map(|k| min + size * (f64::from(k) * SPREAD).fract());
-    let (mut dry, mut wet, mut samples) = (0.0, 0.0, 0);
-    for at in places.clone() {
-        samples += 1;
-        if !(still.is_free(at) && now.is_free(at)) {
-            continue;
-        }
-        *(if fluid.omega(at) > 0.0 { &mut wet } else { &mut dry }) += 1.0;
-        let expected = (LEAST_ROOM - 1.0) * wet;
-        if dry > expected + CERTAIN * (1.0 + expected.sqrt()) {
-            return true;
-        }
-        if dry + wet >= ENOUGH_SAMPLES {
-            break;
-        }
-    }
-    let particles = scene.domain.volume() * wet / samples as f64 / spacing.powi(3);
-    let room = (LEAST_ROOM - 1.0) * wet;
-    let is_unsure = dry + wet < LEAST_SAMPLES || particles < FEWEST;
-    // only now, because to find out how bodies will move takes longest
-    is_unsure || dry + changed(&still, &now, &moving, places.take(samples)) >= room
-}
-
-fn all_at(solids: &[&Solid], time: f64) -> Vec<Solid> {
-    solids.iter().map(|body| body.at(time)).collect()
-}
-
-/// By how many of some places the room changes at most when bodies move: places that they have left, less those
-/// that they have entered.
-fn changed(
-    still: &Crowd<'_>,
-    now: &Crowd<'_>,
-    moving: &[&Solid],
-    places: impl Iterator<Item = DVec3> + Clone,
-) -> f64 {
-    if moving.is_empty() {
-        return 0.0;
-    }
-    let [first, last] = LATER;
-    let factor = (last / first).powf(1.0 / f64::from(INSTANTS - 1));
-    let at_instant = |k: i32| {
-        let then = all_at(moving, first * factor.powi(k));
-        let then = Crowd::of(then.iter());
-        let open = places.clone().filter(|at| still.is_free(*at));
-        open.map(|at| f64::from(then.is_free(at)) - f64::from(now.is_free(at))).sum::<f64>()
-    };
-    (0..INSTANTS).map(at_instant).map(f64::abs).fold(0.0, f64::max)
 }
 
 /// A length as a file writes it, with three digits: `2.5 mm`, `0.12 m`.

@@ -8,6 +8,7 @@ use super::{
     cut::{cut, is_inside},
 };
 use crate::geom::Aabb;
+use crate::interval::Interval;
 
 /// Halvings of a region's box along each axis: 128 cells along a side. The volume of a ball comes out to 1e-4.
 const HALVINGS: u32 = 7;
@@ -19,6 +20,23 @@ pub(crate) struct Region<'a> {
     /// Positive in the bodies.
     pub bodies: Vec<&'a dyn Field>,
     pub within: Aabb,
+}
+
+/// The shape of a region that fills its box.
+pub(crate) struct Everywhere;
+
+impl Field for Everywhere {
+    fn omega(&self, _: DVec3) -> f64 {
+        1.0
+    }
+
+    fn omega_grad(&self, _: DVec3) -> (f64, DVec3) {
+        (1.0, DVec3::ZERO)
+    }
+
+    fn range(&self, _: &Aabb) -> Interval {
+        Interval::point(1.0)
+    }
 }
 
 /// Whether a box is empty, or so thin that rounding alone may have left it: what lies in it has no volume.
@@ -138,6 +156,8 @@ mod tests {
         assert!((whole / of_ball(1.0) - 1.0).abs() < 2e-4, "{whole}");
         let free = Region { shape: &shape, bodies: vec![&body], within }.volume();
         assert!((free / (of_ball(1.0) - of_ball(0.5)) - 1.0).abs() < 3e-4, "{free}");
+        let all = Region { shape: &Everywhere, bodies: vec![&body], within }.volume();
+        assert!((all / (within.volume() - of_ball(0.5)) - 1.0).abs() < 1e-4, "{all}");
         let half = Aabb::new(DVec3::splat(-1.1), DVec3::new(1.1, 1.1, 0.0));
         let below = Region { shape: &shape, bodies: Vec::new(), within: half }.volume();
         assert!((below / (0.5 * of_ball(1.0)) - 1.0).abs() < 2e-4, "{below}");

@@ -1,6 +1,9 @@
 //! Why a run ended before its end, in words that say what to do.
 
+use crate::cli::output::significant;
 use rfm::Experiment;
+use rfm::geom::Aabb;
+use rfm::glam::DVec3;
 use rfm::sph::{Cause, Simulation, StepError, short_time};
 
 /// Why a run ended before its end.
@@ -34,9 +37,15 @@ impl NoRoom {
         }
         let parameters = simulation.parameters();
         let fluid = simulation.particles().len() as f64 * parameters.particle_mass / parameters.rest_density;
-        let (time, free) = (simulation.time(), experiment.free_volume(simulation.time()));
+        let nothing = Aabb::new(DVec3::INFINITY, DVec3::NEG_INFINITY);
+        let domain = experiment.scene().domain;
+        // useless numbers may have thrown particles anywhere
+        let places = simulation.particles().position.iter().filter(|place| domain.contains(*place));
+        let within = places.fold(nothing, |all, place| all.including(place));
+        let within = if within.is_empty() { domain } else { within };
         let least = if failed { ENOUGH_ROOM } else { LEAST_ROOM };
-        (free < least * fluid).then_some(Self { time, free, fluid })
+        let time = simulation.time();
+        experiment.lacks_room(&within, time, least * fluid).map(|free| Self { time, free, fluid })
     }
 }
 
@@ -46,9 +55,11 @@ impl Stop {
         match self {
             Self::Interrupted => None,
             Self::NoRoom(NoRoom { time, free, fluid }) => Some(format!(
-                "t = {} s: the moving obstacles leave {free:.3} m³ of the box to {fluid:.3} m³ of fluid: there is no room \
-                 left for it; let them leave a gap, or end the run before with --until",
-                short_time(*time)
+                "t = {} s: the moving obstacles leave {} m³ of room to {} m³ of fluid: there is no room left for it; \
+                 let them leave a gap, or end the run before with --until",
+                short_time(*time),
+                significant(*free, 3),
+                significant(*fluid, 3)
             )),
             Self::Numerical(StepError::NonFinite { step, cause: Cause::StepTooLong { dt, .. }, .. })
                 if *dt > experiment.parameters().stable_dt(experiment.typical_speed()) =>
