@@ -9,12 +9,14 @@
 //! take from E, so all that it gains is an error of the method. Where walls work on the fluid, what they give
 //! is soon dissipated, and would hide any gain: there E is compared with the least that it has been. Of methods
 //! that know this work roughly, a tenth of it is taken for an error. The energy that a surface under tension
-//! has at the start may become motion, so it is allowed for.
+//! has at the start may become motion, so it is allowed for, less what no surface of the fluid can be without.
 //!
 //! Densities are those that the particles' places say, Σ m·W and the part of the walls, and not those that a
 //! method carries along. A density below that at rest belongs to the surface and counts as that at rest.
 //!
 //! Invariant: sums run in a fixed order, so the same state gives the same bits for any number of threads.
+
+use std::f64::consts::PI;
 
 use glam::DVec3;
 use rayon::prelude::*;
@@ -29,6 +31,7 @@ use super::error::StepError;
 use super::methods::Noted;
 use super::params::Parameters;
 use super::particles::CHUNK;
+use crate::geom::Aabb;
 
 /// The least energy at the start that is judged, in units of Σm·(expected speed)².
 const LEAST_ENERGY: f64 = 1e-9;
@@ -90,7 +93,7 @@ pub struct Audit {
     reference: f64,
     /// The part of that at the start which is due to the fluid's height, J.
     height: f64,
-    /// Kinetic and elastic energy at the start, J.
+    /// Kinetic and elastic energy at the start, and what a surface under tension may release, J.
     at_start: f64,
     /// Work of gravity and of walls since the start, J.
     work: f64,
@@ -228,18 +231,19 @@ impl Audit {
         let sums = Sums::of(core, 0.0);
         let Core { parameters, boundary, particles, .. } = core;
         let (mass, n) = (parameters.particle_mass, particles.len() as f64);
-        let at_start = mass * (0.5 * sums.squares + sums.elastic) + surface_energy(parameters, densities);
+        let own = mass * (0.5 * sums.squares + sums.elastic);
+        let surface = surface_energy(parameters, densities);
         let height = height(core, &sums);
         let scale = n * mass * parameters.expected_speed.powi(2);
         let is_moved = boundary.any_moves();
-        let reference = if is_moved { LEAST_GIVEN * scale } else { 0.0f64 }.max(at_start + height);
+        let reference = if is_moved { LEAST_GIVEN * scale } else { 0.0f64 }.max(own + surface + height);
         let unjudged = (!is_moved && reference <= LEAST_ENERGY * scale).then_some(NO_ENERGY);
         let (compression, volume) = Compression::of(densities, parameters.rest_density);
         Self {
             unjudged,
             reference,
             height,
-            at_start,
+            at_start: own + released(core, surface),
             work: 0.0,
             by_walls: 0.0,
             least: 0.0,
@@ -501,6 +505,32 @@ fn surface_energy(parameters: &Parameters, densities: &[f64]) -> f64 {
     let of_column: f64 =
         (0..layers).map(|k| wall.kernel.covered((f64::from(k) + 0.5) * spacing / wall.h)).sum();
     parameters.surface_tension * spacing.powi(2) * lacking / of_column
+}
+
+/// What the tension of a surface with this energy, J, can set free: beside obstacles all of it, as far as is known; in
+/// a box alone what it has, and may have more than is found, beyond the energy of the smallest surface that the fluid
+/// may have.
+fn released(core: &Core, surface: f64) -> f64 {
+    let Core { parameters, boundary, particles, .. } = core;
+    if !boundary.is_box() {
+        return surface;
+    }
+    let fluid = particles.len() as f64 * parameters.particle_mass / parameters.rest_density;
+    let least = parameters.surface_tension * least_area(&boundary.domain, fluid);
+    (UNSURE_AREA * surface - least).max(0.0)
+}
+
+/// By how much a surface may have more area than is found of it.
+const UNSURE_AREA: f64 = 1.1;
+
+/// The smallest surface, m², of a fluid of this volume, m³, in a box whose walls it meets at a right angle: an eighth
+/// of a sphere in a corner, a quarter of a cylinder along an edge, or a plane, with the fluid or the air inside.
+fn least_area(within: &Aabb, fluid: f64) -> f64 {
+    let sides = within.size();
+    let inside = fluid.min(within.volume() - fluid).max(0.0);
+    let sphere = 0.5 * PI * (6.0 * inside / PI).powf(2.0 / 3.0);
+    let edge = (PI * inside * sides.min_element()).sqrt();
+    sphere.min(edge).min(within.volume() / sides.max_element())
 }
 
 #[cfg(test)]

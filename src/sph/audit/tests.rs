@@ -198,3 +198,29 @@ fn a_fluid_without_energy_is_not_judged() {
     assert_eq!(simulation.audit().unjudged(), Some(NO_ENERGY));
     assert_eq!(simulation.audit().energy_excess(), None);
 }
+
+#[test]
+fn a_film_between_walls_has_nothing_to_release_and_a_drop_has() {
+    let cube = Aabb::new(DVec3::ZERO, DVec3::ONE);
+    // 0.4 m³: a plane of 1 m², a quarter of a cylinder of 1.12 m², an eighth of a sphere of 1.31 m²
+    assert!((least_area(&cube, 0.4) - 1.0).abs() < 1e-12);
+    assert!((least_area(&cube, 0.2) - (0.2 * PI).sqrt()).abs() < 1e-12);
+    // the air above 0.99 m³ is a bubble in a corner of the radius 0.267 m
+    let radius = (0.06 / PI).powf(1.0 / 3.0);
+    assert!((least_area(&cube, 0.99) - 0.5 * PI * radius.powi(2)).abs() < 1e-12);
+
+    let spacing = 0.05;
+    let parameters = Parameters { surface_tension: 1.0, ..parameters(Wcsph::default().into(), spacing) };
+    // plane 0.4 m above the floor, and a ball of 0.2 m
+    let at_start = |is_fluid: &dyn Fn(DVec3) -> bool| {
+        let mut fluid = crate::sph::Particles::default();
+        let sites = (0..8000)
+            .map(|n| spacing * (DVec3::new((n % 20) as f64, (n / 20 % 20) as f64, (n / 400) as f64) + 0.5));
+        sites.filter(|p| is_fluid(*p)).for_each(|p| fluid.push(p, DVec3::ZERO));
+        Simulation::new(parameters.clone(), fluid, cube, Vec::new()).unwrap().audit().at_start
+    };
+    assert!(at_start(&|p| p.z < 0.4) < 0.15);
+    let ball = at_start(&|p| p.distance(DVec3::splat(0.5)) < 0.2);
+    let (whole, least) = (4.0 * PI * 0.04, least_area(&cube, 4.0 / 3.0 * PI * 0.008));
+    assert!((ball / (UNSURE_AREA * whole - least) - 1.0).abs() < 0.2, "{ball} {whole} {least}");
+}

@@ -343,6 +343,11 @@ impl Boundary {
         Some(whole.with_friction(friction))
     }
 
+    /// Whether the box is all that holds the fluid.
+    pub fn is_box(&self) -> bool {
+        self.obstacles.is_empty()
+    }
+
     /// Whether a face of an obstacle before a particle lies in a wall of the box and looks out of it. The
     /// obstacle is then assumed to continue behind that wall, as one that stands out of the box does. Neither
     /// end can be seen, and the room behind the wall would otherwise count as a notch in both.
