@@ -7,24 +7,32 @@ use rfm::{Engine, Experiment, Program};
 use crate::tool::{experiment, run_to, simulation};
 
 /// A channel between two cylinders, five spacings wide, that a force F/r drives: Poiseuille flow that closes on
-/// itself (Dean 1928), as in `examples/validation/poiseuille.rfm`, without any key of the method.
+/// itself (Dean 1928), as in `examples/validation/poiseuille.rfm`, without any key of the method. With `dfsph` it was
+/// 11 % too slow while pressure took away that single particles pass each other.
 #[test]
 fn a_viscous_flow_in_a_channel_is_as_fast_as_is_known() {
+    for (method, most) in [("wcsph", 0.05), ("dfsph", 0.08)] {
+        channel(method, most);
+    }
+}
+
+fn channel(method: &str, most: f64) {
     let (inner, nu) = (0.5_f64, 0.1);
-    let mut simulation = simulation(
+    let mut simulation = simulation(&format!(
         "rfm 1
 let r2 = x^2 + y^2
 solid core = cylinder(0.5, 2).move([0, 0, -1])
 solid vessel = cylinder(1, 2).move([0, 0, -1])
-scene channel {
-  box       { min: [-1.1, -1.1, 0], max: [1.1, 1.1, 0.4] }
-  container { solid: vessel, walls: no_slip, restitution: 0 }
-  obstacle  { solid: core, walls: no_slip, restitution: 0 }
-  fluid oil { shape: 0.25 <= r2 <= 1, density: 1000, spacing: 0.1, viscosity: 100 }
+scene channel {{
+  box       {{ min: [-1.1, -1.1, 0], max: [1.1, 1.1, 0.4] }}
+  container {{ solid: vessel, walls: no_slip, restitution: 0 }}
+  obstacle  {{ solid: core, walls: no_slip, restitution: 0 }}
+  fluid oil {{ shape: 0.25 <= r2 <= 1, density: 1000, spacing: 0.1, viscosity: 100 }}
   gravity: [-y/r2, x/r2, 0]
-  run { until: 1.5 s, save_every: 0.5 s }
-}",
-    );
+  method: {method}
+  run {{ until: 1.5 s, save_every: 0.5 s }}
+}}"
+    ));
     let c = inner * inner * inner.ln() / (1.0 - inner * inner);
     let known = |r: f64| -1.0 / (2.0 * nu) * (r * r.ln() + c * r - c / r);
     run_to(&mut simulation, 1.0);
@@ -39,18 +47,18 @@ scene channel {
         }
     }
     let off = found / wanted - 1.0;
-    println!("mean speed {:+.2} % off", 100.0 * off);
+    println!("{method}: mean speed {:+.2} % off", 100.0 * off);
     // with pressures in pairs it is 12 % too slow
-    assert!(off.abs() < 0.05, "{off}");
+    assert!(off.abs() < most, "{method}: {off}");
 }
 
 /// A full ring pipe seven spacings wide, whose oil a force drives around, without any key of the method. Layers of
 /// particles along the wall must resist a shear as they are asked to: with forces along the lines between particles the
-/// flow of `dfsph` was 24 % too fast.
+/// flow of `dfsph` was 24 % too fast, and while pressure took away that single particles pass each other 8 % too slow.
 #[test]
 fn a_bent_pipe_flows_as_fast_as_is_known() {
-    // ν(u'' + u'/r − u/r²) = −G in the circle, by finite differences on 201² nodes
-    let mean = 0.2328;
+    // G/4ν·(a² − q²) at the distance q from the axis; the bend changes the mean of it by less than 1 %
+    let known = |p: DVec3| 7.5 * (0.25_f64.powi(2) - (p.truncate().length() - 1.0).powi(2) - p.z * p.z);
     for method in ["wcsph", "dfsph"] {
         let mut simulation = simulation(&format!(
             "rfm 1
@@ -68,11 +76,12 @@ scene s {{
         run_to(&mut simulation, 0.6);
         let particles = simulation.particles();
         let places = particles.position.iter().zip(particles.velocity.iter());
-        let along = places.map(|(p, v): (DVec3, DVec3)| (p.x * v.y - p.y * v.x) / p.truncate().length());
-        let found = along.sum::<f64>() / particles.len() as f64;
-        println!("{method}: {found:.4} m/s, known {mean}");
-        // particles stay half a spacing away from the wall, where the fluid is slowest
-        assert!((found / mean - 1.0).abs() < 0.05, "{method}: {found}");
+        let along = |p: DVec3, v: DVec3| (p.x * v.y - p.y * v.x) / p.truncate().length();
+        let [found, wanted] = places.fold([0.0; 2], |[found, wanted], (p, v): (DVec3, DVec3)| {
+            [found + along(p, v), wanted + known(p)]
+        });
+        println!("{method}: {:+.2} % off", 100.0 * (found / wanted - 1.0));
+        assert!((found / wanted - 1.0).abs() < 0.05, "{method}: {found} {wanted}");
     }
 }
 

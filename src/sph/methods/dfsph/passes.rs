@@ -249,7 +249,7 @@ pub(super) struct Drag<'a, const LAMINAR: bool, const ARTIFICIAL: bool> {
     pub constants: Constants,
     pub walls: &'a Walls,
     pub velocity: &'a Vectors,
-    /// Kinematic viscosity ν, m²/s. With the spin it includes the room that a particle has over its volume.
+    /// Kinematic viscosity ν, m²/s.
     pub kinematic: f64,
     /// The factor α·h/2·c of the artificial viscosity, m²/s.
     pub artificial: f64,

@@ -173,17 +173,6 @@ pub struct DivergenceFree {
     last_dt: f64,
 }
 
-/// The room that the particles of a fluid have which fills its vessel, over their volume: one over the mean of their
-/// G. Packing them leaves gaps, so their sums are smaller than those of their room. (With G of each particle
-/// forces in pairs would not conserve momentum.)
-fn room_over_volume(spread: &[f64]) -> f64 {
-    let mean = spread.iter().sum::<f64>() / spread.len().max(1) as f64;
-    if mean > LEAST_SPREAD { 1.0 / mean } else { 1.0 }
-}
-
-/// A fluid with a smaller mean G than this fills no vessel.
-const LEAST_SPREAD: f64 = 0.8;
-
 /// Greatest factor of a force that depends on the place. A step may be a short remainder before a frame; the
 /// force of half a usual step would then need a pressure a hundred times as large.
 const MOST_CARRIED: f64 = 2.0;
@@ -377,8 +366,6 @@ impl DivergenceFree {
             let out = [&mut x[..], y, z, &mut smooth.x, &mut smooth.y, &mut smooth.z];
             let (walls, reaction) = (&self.walls, Reaction::of(core, dt));
             let spin = self.viscosity.find(core, velocity, |i| walls.near(i).map(|(wall, _)| wall.friction));
-            let has_more_room = parameters.fills_vessel && spin.is_some();
-            let kinematic = kinematic * if has_more_room { room_over_volume(&self.spread) } else { 1.0 };
             macro_rules! drag {
                 ($laminar:literal, $artificial:literal) => {{
                     let pass = Drag::<$laminar, $artificial> {
@@ -425,6 +412,9 @@ impl DivergenceFree {
             // particles that have a wall of a spacing between them belong to two bodies
             let bodies = bodies(core, core.parameters.spacing());
             full::find_unwanted(&mut self.free, &bodies, found, relaxation);
+            // a mean over neighbours changes those of the bodies
+            full::smooth(core, &self.walls, &mut self.free, &mut self.field);
+            full::remove_means(&mut self.free, &bodies.0, bodies.1);
         } else {
             let (rates, densities, debts) = found;
             let unwanted = |((rate, rho), debt): ((&f64, &f64), &f64)| {
