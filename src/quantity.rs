@@ -236,7 +236,8 @@ fn base_unit(word: &str) -> Option<Unit> {
         "km" => unit(1e3, Dimension::LENGTH),
         "cm" => unit(1e-2, Dimension::LENGTH),
         "mm" => unit(1e-3, Dimension::LENGTH),
-        "um" | "µm" => unit(1e-6, Dimension::LENGTH),
+        // the sign for micro, or the Greek letter, which looks the same
+        "um" | "µm" | "μm" => unit(1e-6, Dimension::LENGTH),
         "kg" => unit(1.0, Dimension::MASS),
         "g" => unit(1e-3, Dimension::MASS),
         "s" => unit(1.0, Dimension::TIME),

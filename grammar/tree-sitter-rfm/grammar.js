@@ -3,7 +3,7 @@
 const ITEMS = ["import", "param", "let", "fn", "solid", "scene"];
 const FOLDS = ["any", "all", "sum", "product", "min", "max"];
 const UNITS = [
-  "kPa", "MPa", "mPa", "Pa", "deg", "rad", "rpm", "min", "mm", "cm", "km", "um", "µm", "kg", "kJ", "kN", "mN",
+  "kPa", "MPa", "mPa", "Pa", "deg", "rad", "rpm", "min", "mm", "cm", "km", "um", "µm", "μm", "kg", "kJ", "kN", "mN",
   "ms", "us", "Hz", "N", "J", "m", "g", "s", "h", "°",
 ];
 

@@ -379,7 +379,7 @@ pub(super) struct Run {
     /// Folder for frames, pictures and summary [default: the file's name + .out]
     #[arg(short, long, value_name = "DIR")]
     pub output: Option<PathBuf>,
-    /// Stop after this many steps, counted from the run's beginning
+    /// Stop after this many steps, counted from the run's beginning, whatever the scene says of the end
     #[arg(long, value_name = "N", conflicts_with = "until", allow_negative_numbers = true)]
     pub steps: Option<u64>,
     /// Stop at this simulated time, in seconds or with a unit: 500ms

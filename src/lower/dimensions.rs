@@ -4,7 +4,7 @@
 use super::lowering::Lowering;
 use crate::diagnostic::{Code, Diagnostic, SourceId};
 use crate::quantity::{Dimension, parse_unit};
-use crate::syntax::ast::{Expr, ExprKind, MulOp};
+use crate::syntax::ast::{Expr, ExprKind, MulOp, Param};
 
 /// What an argument of a standard function or of a method measures.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -154,6 +154,29 @@ impl Lowering<'_> {
             Diagnostic::error(Code::UNIT_MISMATCH, second.span, message)
                 .at(kind_b)
                 .label(first.span, kind_a)
+                .help(help),
+        );
+        false
+    }
+
+    /// Whether the ends of a param's range may measure what its value does, as far as their units tell. If not, this is
+    /// reported.
+    pub fn range_measures_the_same(&mut self, param: &Param) -> bool {
+        let Some((low, high)) = &param.range else { return true };
+        let of = |of: &Self, expr| of.dimension(expr).filter(|found| *found != Dimension::NONE);
+        let (stated, [from, to]) = (of(self, &param.value), [low, high].map(|end| of(self, end)));
+        let Some(wanted) = stated.or(from) else { return true };
+        let wrong = [(from, low), (to, high)].into_iter().find_map(|(found, end)| {
+            found.filter(|found| *found != wanted).map(|found| (kind(found), end.span))
+        });
+        let Some((found, span)) = wrong else { return true };
+        let message =
+            format!("`{}` is {}, and {found} is no end of its range", param.name.text, kind(wanted));
+        let help = "write both ends of the range in a unit of the value, as in `5 mm in 1 mm .. 10 mm`";
+        self.report(
+            Diagnostic::error(Code::UNIT_MISMATCH, span, message)
+                .at(found)
+                .label(param.value.span, kind(wanted))
                 .help(help),
         );
         false

@@ -480,7 +480,8 @@ fn number(name: &str, a: &[&str]) -> Option<Words> {
             [a, b, t] => written("a formula here", &format!("({a}) + (({b}) - ({a}))*({t})")),
             _ => written("a formula here", "a + (b - a)*t"),
         },
-        "norm" | "magnitude" | "mag" | "len" | "vlength" | "distance" => match a {
+        "len" => written("`count` for lists and `length` for vectors here", &format!("count({first})")),
+        "norm" | "magnitude" | "mag" | "vlength" | "distance" => match a {
             [a, b] => written("`length` here", &format!("length({a} - {b})")),
             _ => written("`length` here", &format!("length({first})")),
         },

@@ -261,9 +261,10 @@ impl<'a> Lowering<'a> {
             )
         });
         self.module.fixed = fixed;
+        let has_one_kind = self.range_measures_the_same(param);
         let range = match range {
-            Some((Some(low), Some(high))) => Some((low, high)),
-            _ => None,
+            Some((Some(low), Some(high))) if has_one_kind => Some((low, high)),
+            Some(_) | None => None,
         };
         self.remember_units(&param.name, &param.value);
         let qualified = format!("{}{}", self.qualifier, param.name.text);
