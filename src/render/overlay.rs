@@ -56,7 +56,8 @@ impl<'a> Scale<'a> {
 pub struct Caption {
     /// Simulated time in seconds.
     pub time: f64,
-    /// The time between pictures, s: times are shown with the digits that tell two of them apart. 0 for the usual digits.
+    /// The time between pictures, s: times are shown with the digits that tell two of them apart. 0 for the usual
+    /// digits.
     pub every: f64,
     /// The number of the step, if it is known.
     pub step: Option<u64>,
