@@ -126,6 +126,7 @@ fn page_of_simulation(experiment: &Experiment, simulation: &Simulation, facts: &
         gravity: None,
         params: Vec::new(),
         plots: None,
+        picture: None,
     };
     let mut out = Vec::new();
     let mut page = Page::begin(&mut out, &setting).ok()?;
