@@ -3,7 +3,6 @@
 use crate::cli::output::significant;
 use rfm::Experiment;
 use rfm::geom::Aabb;
-use rfm::glam::DVec3;
 use rfm::sph::{Cause, Simulation, StepError, short_time};
 
 /// Why a run ended before its end.
@@ -37,11 +36,10 @@ impl NoRoom {
         }
         let parameters = simulation.parameters();
         let fluid = simulation.particles().len() as f64 * parameters.particle_mass / parameters.rest_density;
-        let nothing = Aabb::new(DVec3::INFINITY, DVec3::NEG_INFINITY);
         let domain = experiment.scene().domain;
         // useless numbers may have thrown particles anywhere
         let places = simulation.particles().position.iter().filter(|place| domain.contains(*place));
-        let within = places.fold(nothing, |all, place| all.including(place));
+        let within = places.fold(Aabb::EMPTY, |all, place| all.including(place));
         let within = if within.is_empty() { domain } else { within };
         let least = if failed { ENOUGH_ROOM } else { LEAST_ROOM };
         let time = simulation.time();
