@@ -86,7 +86,8 @@ impl Solid {
     }
 
     /// Distance, normal and curvature of the surface as seen from a point: accurate near the surface, an
-    /// estimate far away, but never 0 off the surface.
+    /// estimate far away, but never 0 off the surface. Where the derivatives say nothing and no surface is found, as
+    /// beside an empty solid, the distance is infinite.
     pub fn contact(&self, p: DVec3) -> Contact {
         self.contact_or_search(p, &OnceCell::new())
     }
@@ -96,7 +97,7 @@ impl Solid {
         let contact = self.estimated_contact(p);
         let is_lost = contact.distance == 0.0 || contact.distance.is_nan();
         if is_lost && self.sign(p).abs() == 1.0 {
-            searched_contact(distances.get_or_init(|| Distances::new(self)), p).unwrap_or(contact)
+            searched_contact(distances.get_or_init(|| Distances::new(self)), p, contact)
         } else {
             contact
         }
@@ -181,12 +182,16 @@ impl Solid {
     }
 }
 
-/// The contact with the nearest point of the surface; `None` if there is no surface. Nothing is known of its
-/// curvature.
-fn searched_contact(distances: &Distances, p: DVec3) -> Option<Contact> {
+/// The contact with the nearest point of the surface, of whose curvature nothing is known. Where no surface is found it
+/// is infinitely far, and the rest stays that of `lost`.
+fn searched_contact(distances: &Distances, p: DVec3, lost: Contact) -> Contact {
     let Distance { estimate, nearest, .. } = distances.at(p);
     let normal = (p - nearest) / estimate;
-    normal.is_finite().then_some(Contact { distance: estimate, normal, mean_curvature: 0.0 })
+    match normal.is_finite() {
+        true => Contact { distance: estimate, normal, mean_curvature: 0.0 },
+        false if estimate.is_infinite() => Contact { distance: estimate, ..lost },
+        false => lost,
+    }
 }
 
 impl Field for Solid {

@@ -33,6 +33,46 @@ fn quadrics_are_exact_along_the_normal() {
     check("box([0,0,0], [3,3,3])", [-2.0, 1.0, 1.0], 2.0, [-1.0, 0.0, 0.0], 0.0);
 }
 
+/// A factor that is the same everywhere, but no constant, changes neither the distance nor the speed of a wall.
+#[test]
+fn factors_that_depend_on_time_alone_move_nothing() {
+    let near = |a: f64, b: f64| (a - b).abs() < 1e-9;
+    for (definition, p, distance, speed) in [
+        ("ellipsoid(1 + t, 1, 0.3)", [1.3, 0.0, 0.0], 0.1, Some(1.3 / 1.2)),
+        ("(1 + t)*sphere(1 + t)", [1.3, 0.0, 0.0], 0.1, Some((0.5 + 0.5 * 1.3 * 1.3 / 1.44) / (1.3 / 1.2))),
+        ("min(1, 2 + t)*sphere(1 + t)", [0.0, 1.2, 0.0], 0.0, Some(1.0)),
+        ("(1 + t)*(1 - x^2 + t)", [1.2_f64.sqrt(), 0.0, 0.0], 0.0, None),
+        ("(1 + t)*sphere(1)", [2.0, 0.0, 0.0], 1.0, Some(0.0)),
+        ("(t - 1)*sphere(1)", [2.0, 0.0, 0.0], -1.0, Some(0.0)),
+    ] {
+        let (moving, p) = (solid(definition).at(0.2), DVec3::from_array(p));
+        let found = moving.contact(p);
+        assert!(near(found.distance, distance), "{definition}: {found:?}");
+        // −∂ω/∂t·∇ω/|∇ω|²
+        let (omega, gradient) = moving.omega_grad(p);
+        let step = 1e-6;
+        let [before, after] = [-step, step].map(|dt| solid(definition).at(0.2 + dt).omega(p));
+        let expected = -(after - before) / (2.0 * step) / gradient.length();
+        let velocity = moving.wall_velocity(p);
+        let along = velocity.dot(gradient) / gradient.length();
+        if omega.abs() < 1e-12 {
+            assert!((along - expected).abs() < 1e-6, "{definition}: {along}, expected {expected}");
+        }
+        if let Some(speed) = speed {
+            assert!((velocity.length() - speed).abs() < 1e-6, "{definition}: {velocity}, expected {speed}");
+        }
+    }
+}
+
+/// Beside an empty solid there is no surface, however flat ω is.
+#[test]
+fn the_surface_of_an_empty_solid_is_infinitely_far() {
+    for p in [DVec3::ZERO, DVec3::new(0.0, 1.0, 2.0)] {
+        assert_eq!(solid("x^2 <= -1").contact(p).distance, f64::INFINITY);
+        assert_eq!(solid("x^2 >= -1").contact(p).distance, f64::NEG_INFINITY);
+    }
+}
+
 /// Squares of these gradients are no numbers, or zero: the surface is searched for.
 #[test]
 fn gradients_beyond_the_range_of_squares() {

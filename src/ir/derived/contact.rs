@@ -71,18 +71,24 @@ struct Builder<'g> {
 /// How a shape is made of others.
 #[derive(Clone, Copy)]
 enum Kind {
-    /// A product of two factors that vary, split into its faces.
+    /// A product of two factors that vary in space, split into its faces.
     Product(Node, Node),
+    /// A factor that is computed and the same everywhere, and what it scales: a shape of its sign.
+    Scaled {
+        factor: Node,
+        shape: Node,
+    },
     Signs(SignRule),
 }
 
 impl Kind {
     fn operands(self) -> impl Iterator<Item = Node> {
-        let (faces, rule) = match self {
+        let (shapes, rule) = match self {
             Self::Product(p, q) => ([Some(p), Some(q)], SignRule::Leaf),
+            Self::Scaled { shape, .. } => ([Some(shape), None], SignRule::Leaf),
             Self::Signs(rule) => ([None; 2], rule),
         };
-        faces.into_iter().flatten().chain(rule.operands())
+        shapes.into_iter().flatten().chain(rule.operands())
     }
 }
 
@@ -110,21 +116,25 @@ impl Builder<'_> {
 
     fn kind(&self, node: Node) -> Kind {
         match SignRule::of(self.graph, node) {
-            SignRule::Leaf => {
-                self.faces(node).map_or(Kind::Signs(SignRule::Leaf), |(p, q)| Kind::Product(p, q))
-            }
+            SignRule::Leaf => self.product(node).unwrap_or(Kind::Signs(SignRule::Leaf)),
             rule => Kind::Signs(rule),
         }
     }
 
-    /// The factors of a product, both of which vary.
-    fn faces(&self, node: Node) -> Option<(Node, Node)> {
-        let varies = |factor| {
-            !matches!(self.graph.expr(factor), Expr::Constant(_) | Expr::Parameter(_) | Expr::Uniform(_))
-        };
-        match self.graph.expr(node) {
-            Expr::Binary(Binary::Mul, p, q) if p != q && varies(p) && varies(q) => Some((p, q)),
-            _ => None,
+    /// What becomes of a product; `None` for other formulas, and where a factor is a number.
+    fn product(&self, node: Node) -> Option<Kind> {
+        let Expr::Binary(Binary::Mul, p, q) = self.graph.expr(node) else { return None };
+        let is_number =
+            |node| matches!(self.graph.expr(node), Expr::Constant(_) | Expr::Parameter(_) | Expr::Uniform(_));
+        if p == q || is_number(p) || is_number(q) {
+            return None;
+        }
+        let varies = |node| Axis::SPACE.iter().any(|&axis| self.graph.uses(node, axis));
+        match (varies(p), varies(q)) {
+            (true, true) => Some(Kind::Product(p, q)),
+            (false, true) => Some(Kind::Scaled { factor: p, shape: q }),
+            (true, false) => Some(Kind::Scaled { factor: q, shape: p }),
+            (false, false) => None,
         }
     }
 
@@ -137,12 +147,25 @@ impl Builder<'_> {
                 let neither = self.nearer(p, q, Binary::Min);
                 self.nearer(both, neither, Binary::Max)
             }
+            Kind::Scaled { factor, shape } => self.scaled(factor, self.known[&shape]),
             Kind::Signs(SignRule::All(u, v)) => self.nearer(self.known[&u], self.known[&v], Binary::Min),
             Kind::Signs(SignRule::Any(u, v)) => self.nearer(self.known[&u], self.known[&v], Binary::Max),
             Kind::Signs(SignRule::Not(u)) => self.negated(self.known[&u]),
             // a positive factor moves nothing
             Kind::Signs(SignRule::Same(u)) => self.known[&u],
             Kind::Signs(SignRule::Leaf) => self.leaf(node),
+        }
+    }
+
+    /// A factor that is the same everywhere moves nothing: where it is negative, the two sides change places.
+    fn scaled(&mut self, factor: Node, s: Surface) -> Surface {
+        let sign = self.graph.unary(Unary::Sign, factor);
+        let mut signed = |node: Node| self.graph.binary(Binary::Mul, sign, node);
+        Surface {
+            depth: signed(s.depth),
+            normal: s.normal.map(&mut signed),
+            curvature: signed(s.curvature),
+            velocity: s.velocity,
         }
     }
 
