@@ -6,7 +6,7 @@ use std::path::Path;
 
 use super::failure::{Failure, note};
 use super::shared::Shared;
-use crate::cli::output::Shown;
+use crate::cli::output::{self, Shown};
 use rfm::Program;
 use rfm::compile::{files_beside, text_of};
 use rfm::diagnostic::{Code, Diagnostics, Source, Style, render};
@@ -26,6 +26,7 @@ pub(super) fn read(path: &Path) -> Result<Source, Failure> {
     let text = result.and_then(|_| text_of(bytes));
     let text =
         text.map_err(|error| Failure::usage(format!("cannot read `{}`: {error}", Path::new(&name).shown())))?;
+    output::remember_input(path);
     Ok(Source::file(name, text))
 }
 
@@ -39,8 +40,11 @@ pub(super) fn check(shared: &Shared, source: Source, files: Files) -> Result<Pro
     let overrides = shared.define.iter().map(|given| (given.name.clone(), given.value)).collect();
     let (dimensions, places) = (shared.dimensions(), shared.places());
     let max_nodes = shared.max_nodes;
-    let options = Options { overrides, dimensions, places, max_nodes, files, ..Options::default() };
-    Program::check(source, options)
+    let options =
+        Options { overrides, dimensions, places, max_nodes, files: files.clone(), ..Options::default() };
+    let checked = Program::check(source, options);
+    files.asked().iter().for_each(|name| output::remember_input(Path::new(name)));
+    checked
 }
 
 /// Reads and checks a file, and prints its messages.

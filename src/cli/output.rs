@@ -19,8 +19,43 @@ use super::interrupt;
 /// Beginning of the names of temporary files. The name of the file that is written follows.
 pub(super) const TEMPORARY: &str = ".rfm-";
 
-/// Writes a file through a callback. If anything fails, a file that was there before is unchanged.
+/// The files that this command has read, without links and detours.
+static READ: Mutex<Vec<PathBuf>> = Mutex::new(Vec::new());
+
+/// Remembers that the command has read a file: no output may take its place. Names that lead to no file are left out.
+pub(super) fn remember_input(path: &Path) {
+    if let (Ok(file), Ok(mut read)) = (path.canonicalize(), READ.lock())
+        && !read.contains(&file)
+    {
+        read.push(file);
+    }
+}
+
+/// Refuses an output that would replace a file that this command has read, however its path is spelt.
+///
+/// # Errors
+/// [`Failure::Usage`] with both paths.
+pub(super) fn keep_inputs(path: &Path) -> Result<(), Failure> {
+    let Ok(file) = path.canonicalize() else { return Ok(()) };
+    let is_input = file.is_file() && READ.lock().is_ok_and(|read| read.contains(&file));
+    if !is_input {
+        return Ok(());
+    }
+    Err(Failure::usage(format!(
+        "`{}` is one of the files that this command reads, and would be lost: choose another name for the output",
+        path.shown()
+    )))
+}
+
+/// Writes a file through a callback. If anything fails, a file that was there before is unchanged. The files that the
+/// command reads are never replaced.
 pub(super) fn write(path: &Path, fill: impl FnOnce(&mut dyn Write) -> io::Result<()>) -> Result<(), Failure> {
+    keep_inputs(path)?;
+    write_anew(path, fill)
+}
+
+/// [`write`], also in place of a file that the command has read.
+fn write_anew(path: &Path, fill: impl FnOnce(&mut dyn Write) -> io::Result<()>) -> Result<(), Failure> {
     let failed = |error: io::Error| {
         // an error may carry the temporary name, which means nothing to the user
         let text = error.to_string();
@@ -81,6 +116,7 @@ const MOST_LINKS: usize = 40;
 
 /// Lets another program write a file: `fill` gets the path of a temporary one, which then takes the place of the file.
 pub(super) fn through(path: &Path, fill: impl FnOnce(&Path) -> Result<(), Failure>) -> Result<(), Failure> {
+    keep_inputs(path)?;
     let failed = |error: io::Error| Failure::usage(format!("cannot write `{}`: {error}", path.shown()));
     let to = &target(path);
     let folder = to.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
@@ -112,7 +148,7 @@ pub(super) fn replace(path: &Path, text: &str) -> Result<(), Failure> {
     if permissions.readonly() {
         return Err(failed(io::ErrorKind::PermissionDenied.into()));
     }
-    write(&target, |out| out.write_all(text.as_bytes()))?;
+    write_anew(&target, |out| out.write_all(text.as_bytes()))?;
     std::fs::set_permissions(&target, permissions).map_err(failed)
 }
 

@@ -219,3 +219,35 @@ fn the_commands_read_files_of_the_folder_and_no_others() {
     }
     assert!(Program::from_path(root.join("work/main.rfm")).is_ok());
 }
+
+/// No output takes the place of a file that the command has read, however its path is spelt.
+#[test]
+fn outputs_do_not_replace_inputs() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = |name: &str| folder.path().join(name);
+    std::fs::copy(crate::tool::root().join("examples/parts/bracket.stl"), at("b.stl")).unwrap();
+    std::fs::write(at("lib.rfm"), "rfm 1\nsolid a = sphere(1)\n").unwrap();
+    std::fs::write(at("main.c"), "rfm 1\nimport \"lib.rfm\" as lib\nsolid b = lib.a\n").unwrap();
+    std::fs::write(at("b.rfm"), "rfm 1\nsolid b = mesh(\"b.stl\", 1 mm)\n").unwrap();
+    std::fs::create_dir(at("sub")).unwrap();
+    let original: Vec<Vec<u8>> = ["b.stl", "main.c"].map(|name| std::fs::read(at(name)).unwrap()).into();
+    #[cfg(unix)]
+    std::os::unix::fs::symlink(at("b.stl"), at("link.stl")).unwrap();
+    for arguments in [
+        &["mesh", "b.rfm", "--cells", "10", "-o", "b.stl"][..],
+        &["mesh", "b.rfm", "--cells", "10", "-o", "sub/../b.stl"],
+        #[cfg(unix)]
+        &["mesh", "b.rfm", "--cells", "10", "-o", "link.stl"],
+        &["build", "main.c", "-o", "main.c"],
+        &["build", "main.c", "-o", "./main.c"],
+    ] {
+        let outcome = rfm(folder.path(), arguments).expect(2);
+        assert!(outcome.stderr.contains("is one of the files that this command reads"), "{}", outcome.stderr);
+    }
+    let now: Vec<Vec<u8>> = ["b.stl", "main.c"].map(|name| std::fs::read(at(name)).unwrap()).into();
+    assert!(original == now, "a file has changed");
+    // a second output of one name is no input
+    for _ in 0..2 {
+        rfm(folder.path(), &["mesh", "b.rfm", "--cells", "10", "-o", "new.stl"]).expect(0);
+    }
+}

@@ -55,6 +55,7 @@ pub(super) fn run(shared: &Shared, options: &Options) -> Result<(), Failure> {
     }
     let (writer, unit) = writer(shared, options)?;
     let program = input::program(shared, &options.file)?;
+    options.output.as_deref().map_or(Ok(()), output::keep_inputs)?;
     let solid = choose::solid_at(shared, &program, options.solid.as_deref(), options.time)?;
     let grid = grid(&solid, options)?;
 
