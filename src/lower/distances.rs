@@ -3,7 +3,7 @@
 use super::lowering::Lowering;
 use crate::diagnostic::Span;
 use crate::geom::Aabb;
-use crate::ir::{self, Binary, Expr, Given, Graph, Interpreter, Node, Unary};
+use crate::ir::{self, Axis, Binary, Expr, Given, Graph, Interpreter, Node, Unary};
 
 /// How many places a part is looked at to find what its slope is like.
 const PLACES: u32 = 48;
@@ -19,6 +19,17 @@ pub(super) struct Known {
     pub field: Node,
     /// The greatest distance within: half of the thickness. Infinite where none is known.
     pub greatest: f64,
+    /// Where the formula is proven to be a square of distances.
+    pub square: Option<Square>,
+}
+
+/// A field that falls off as a square of distances: ω = kδ − cδ²/2 at the depth δ, everywhere.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Square {
+    /// k: the slope on the surface.
+    pub at_surface: f64,
+    /// c > 0: how fast it falls inwards.
+    pub bend: f64,
 }
 
 /// How a part's field becomes a distance, with g = |∇ω|.
@@ -46,7 +57,7 @@ impl Lowering<'_> {
         let half = within.map_or(half, |within| within.size().max_element());
         let middle = within.map_or([0.0; 3], |within| within.centre().to_array());
         let is_one = |number: f64| (number - 1.0).abs() <= ROUNDING;
-        let endless = |field| Some(Known { field, greatest: f64::INFINITY });
+        let endless = |field| Some(Known { field, greatest: f64::INFINITY, square: None });
         match self.profile(leaf, middle, half) {
             Profile::Linear(slope) if is_one(slope) => endless(leaf),
             Profile::Linear(slope) => {
@@ -57,6 +68,10 @@ impl Lowering<'_> {
                 let bent = second.filter(|second| *second < 0.0);
                 // the depth at which the slope has fallen to zero
                 let greatest = bent.map_or(f64::INFINITY, |second| at_surface / -second);
+                // for a formula in pieces the places that were looked at prove nothing elsewhere
+                let square = bent
+                    .filter(|_| self.is_polynomial(leaf))
+                    .map(|second| Square { at_surface, bend: -second });
                 let at_surface = self.constant(if is_one(at_surface) { 1.0 } else { at_surface });
                 let slope = self.slope_of_leaf(leaf, span);
                 let field = match bent.filter(|_| self.divides(slope)) {
@@ -67,7 +82,8 @@ impl Lowering<'_> {
                         self.binary(Binary::Div, twice, sum, span)
                     }
                 };
-                Some(Known { field, greatest })
+                self.module.graph.enclose(field, leaf);
+                Some(Known { field, greatest, square })
             }
             Profile::Other => None,
         }
@@ -85,6 +101,25 @@ impl Lowering<'_> {
         let slope = self.unary(Unary::Sqrt, sum, span);
         let difference = self.binary(Binary::Sub, at_surface, slope, span);
         self.binary(Binary::Div, difference, curved, span)
+    }
+
+    /// Whether a formula is a polynomial of the coordinates. What holds of it at places in general position then holds
+    /// everywhere.
+    fn is_polynomial(&self, formula: Node) -> bool {
+        let graph = &self.module.graph;
+        let varies = |node: Node| Axis::SPACE.iter().any(|&axis| graph.uses(node, axis));
+        graph.cone(formula).into_iter().filter(|&node| varies(node)).all(|node| match graph.expr(node) {
+            Expr::Coordinate(_)
+            | Expr::Unary(Unary::Neg, _)
+            | Expr::Binary(Binary::Add | Binary::Sub | Binary::Mul, ..) => true,
+            Expr::Binary(Binary::Div, _, divisor) => !varies(divisor),
+            Expr::Unary(..)
+            | Expr::Binary(..)
+            | Expr::Constant(_)
+            | Expr::Parameter(_)
+            | Expr::Uniform(_)
+            | Expr::Lookup(..) => false,
+        })
     }
 
     /// Whether a formula divides by something that may be zero.

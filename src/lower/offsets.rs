@@ -5,6 +5,7 @@
 
 use rustc_hash::FxHashMap;
 
+use super::distances::Square;
 use super::joints::{Joint, Side};
 use super::lowering::Lowering;
 use super::value::Value;
@@ -77,15 +78,30 @@ impl Lowering<'_> {
     /// A formula whose surface is moved outwards: by its distance, or by g = |∇ω| to first order.
     fn offset_leaf(&mut self, side: Side, length: Node, within: Option<Aabb>, span: Span) -> Node {
         let half = self.known_value(length).map_or(1.0, |length| (4.0 * length.abs()).max(1.0));
-        let (field, by) = match self.exact_distance(side.node, (within, half), span) {
-            Some(distance) => (distance.field, length),
+        let (field, by, square) = match self.exact_distance(side.node, (within, half), span) {
+            Some(distance) => (distance.field, length, distance.square),
             None => {
                 let slope = self.slope_of_leaf(side.node, span);
-                (side.node, self.binary(Binary::Mul, length, slope, span))
+                (side.node, self.binary(Binary::Mul, length, slope, span), None)
             }
         };
         let field = self.signed(field, side.negated, span);
-        self.binary(Binary::Add, field, by, span)
+        let moved = self.binary(Binary::Add, field, by, span);
+        if let Some(square) = square.filter(|_| !side.negated) {
+            let hull = self.offset_square(side.node, square, length, span);
+            self.module.graph.enclose(moved, hull);
+        }
+        moved
+    }
+
+    /// ω + kd + cd²/2, which is positive wherever the distance within, plus d, is: ω is −kd − cd²/2 at the distance d
+    /// outside. In this formula ω stands once, so that it shows where the solid ends.
+    fn offset_square(&mut self, leaf: Node, square: Square, length: Node, span: Span) -> Node {
+        let [slope, half] = [square.at_surface, 0.5 * square.bend].map(|number| self.constant(number));
+        let bent = self.binary(Binary::Mul, half, length, span);
+        let sum = self.binary(Binary::Add, slope, bent, span);
+        let level = self.binary(Binary::Mul, sum, length, span);
+        self.binary(Binary::Add, leaf, level, span)
     }
 
     fn signed(&mut self, field: Node, negated: bool, span: Span) -> Node {

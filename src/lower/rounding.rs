@@ -74,7 +74,7 @@ impl Lowering<'_> {
                 Joint::Least(parts) => self.plain(Binary::Min, of(parts), span),
                 Joint::Greatest(parts) => self.plain(Binary::Max, of(parts), span),
                 Joint::Leaf => {
-                    let Known { field, greatest } = self.distance(side.node, within, &radii, span);
+                    let Known { field, greatest, .. } = self.distance(side.node, within, &radii, span);
                     if side.negated {
                         let field = self.unary(Unary::Neg, field, span);
                         Rounded { field, around: field, half: f64::INFINITY }
@@ -189,6 +189,8 @@ impl Lowering<'_> {
         let [slope, part] = [slope, part].map(|a| self.binary(Binary::Mul, a, a, span));
         let sum = self.binary(Binary::Add, slope, part, span);
         let root = self.unary(Unary::Sqrt, sum, span);
-        Known { field: self.binary(Binary::DivOrZero, leaf, root, span), greatest: f64::INFINITY }
+        let field = self.binary(Binary::DivOrZero, leaf, root, span);
+        self.module.graph.enclose(field, leaf);
+        Known { field, greatest: f64::INFINITY, square: None }
     }
 }

@@ -41,6 +41,29 @@ fn check(text: &str, min: [f64; 3], max: [f64; 3], slack: f64) {
     assert!(points.is_empty() || found.union(&points) == found, "{text}: {points:?} not in {found:?}");
 }
 
+/// The parts of rounded and offset shapes are distances, whose formulas do not show where they end.
+#[test]
+fn rounded_and_offset_shapes_end_where_their_parts_do() {
+    check("box([0,0,0],[9,3,0.4]).round(0.15)", [0.0; 3], [9.0, 3.0, 0.4], 1e-3);
+    check("box([0,0,0],[1,1,1]).round(0.1)", [0.0; 3], [1.0; 3], 1e-3);
+    // the arc at the foot takes something of its radius
+    check("cone(1,2).round(0.1)", [-0.9607, -0.9607, 0.0], [0.9607, 0.9607, 2.0], 1e-3);
+    check("box([0,0,0],[9,3,0.4]).offset(0.2)", [-0.2; 3], [9.2, 3.2, 0.6], 1e-6);
+    check("box([0,0,0],[9,3,0.4]).offset(-0.1)", [0.1; 3], [8.9, 2.9, 0.3], 1e-6);
+    check("(sphere(1) or box([0,0,0],[2,2,2])).offset(0.5)", [-1.5; 3], [2.5; 3], 1e-5);
+}
+
+/// Of bounds that may be too large, that is known.
+#[test]
+fn bounds_are_tight_or_said_not_to_be() {
+    for text in ["sphere(1)", "box([0,0,0],[9,3,0.4])", "torus(1, 0.25).rotate_x(0.3)"] {
+        assert!(solid(text).bounds_are_tight(), "{text}");
+    }
+    let joint = solid("chamfer(box([0,0,0],[2,1,0.4]), box([0.5,0.2,0.2],[1,0.8,1]), 0.2)");
+    let Bounds::Within(found) = *joint.bounds() else { panic!("{:?}", joint.bounds()) };
+    assert!(found.min.z > -1e-3 || !joint.bounds_are_tight(), "{found:?}");
+}
+
 #[test]
 fn conjuncts_bound_each_other() {
     check("x^3 - y^2 - z^2 and x <= 1", [0.0, -1.0, -1.0], [1.0, 1.0, 1.0], 1e-5);

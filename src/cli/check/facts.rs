@@ -66,6 +66,9 @@ pub(super) struct Facts {
     /// Whether the bounds reach farther than the mesh by more than its cells may hide.
     #[serde(skip)]
     pub are_loose: bool,
+    /// Whether no point of the solid is proven to be near some side of the bounds.
+    #[serde(skip)]
+    pub are_unproven: bool,
     /// What there is to ask of sides that are far longer than others.
     #[serde(skip)]
     pub uneven_sides: Option<String>,
@@ -99,6 +102,7 @@ impl Facts {
             wants_time: false,
             no_volume: None,
             are_loose: false,
+            are_unproven: false,
             uneven_sides: None,
             shows_nothing: false,
         }
@@ -156,7 +160,7 @@ fn print_solid(solid: &Facts) {
     }
     if let Some(bounds) = &solid.bounds {
         let [min, max] = corners(bounds);
-        let at_most = if solid.are_loose { "at most " } else { "" };
+        let at_most = if solid.are_loose || solid.are_unproven { "at most " } else { "" };
         say!("    bounds      {at_most}{min} … {max}");
         if let Some(why) = &solid.no_volume {
             say!("    volume      not found: {why}");

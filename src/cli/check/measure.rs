@@ -44,6 +44,7 @@ pub(super) fn measure(
         }
     };
     facts.bounds = Some(Box3::of(bounds));
+    facts.are_unproven = !solid.bounds_are_tight();
     let triangles = solid.triangles().map(|(places, triangles)| Mesh::from_triangles(places, triangles));
     if let Some(mesh) = &triangles {
         exact(mesh, &mut facts);

@@ -8,7 +8,8 @@ pub enum Bounds {
     /// It is proven that ω > 0 nowhere, up to 2²⁵⁰ from the origin.
     Empty,
     /// It is proven that the solid lies in this box. Each face is within a millionth of the longest side of
-    /// the solid itself, where the budget of the search allowed it.
+    /// the solid itself, where the budget of the search allowed it; see
+    /// [`Solid::bounds_are_tight`](crate::Solid::bounds_are_tight).
     Within(Aabb),
     /// No such box was found; [`Solid::unbounded`](crate::Solid::unbounded) names the operand without bounds.
     Unbounded,

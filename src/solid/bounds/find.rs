@@ -3,15 +3,21 @@
 use super::contraction::Tree;
 use super::extent::Bounds;
 use super::found::FoundBounds;
-use super::search::{Side, search};
+use super::search::{Found, Side, search};
 use super::whole::WholeFormula;
-use crate::geom::Aabb;
 use crate::solid::construction::Solid;
 
 impl Solid {
     /// Where the solid is; found on first use, then kept.
     pub fn bounds(&self) -> &Bounds {
         &self.found_bounds().bounds
+    }
+
+    /// Whether a point of the solid is proven to be near each side of its bounds: within a millionth of the longest
+    /// side where the budget of the search allowed it, and within a thousandth in any case. Otherwise the bounds hold
+    /// the solid and may be too large.
+    pub fn bounds_are_tight(&self) -> bool {
+        self.found_bounds().are_tight
     }
 
     /// The sides to which no end of the solid was found.
@@ -21,17 +27,17 @@ impl Solid {
 
     fn found_bounds(&self) -> &FoundBounds {
         self.moment.bounds(|| {
-            let Some(hull) = self.hull() else {
-                return FoundBounds { bounds: Bounds::Empty, open: Vec::new() };
+            let Some(Found { hull, is_tight }) = self.hull() else {
+                return FoundBounds { bounds: Bounds::Empty, open: Vec::new(), are_tight: true };
             };
             let open: Vec<Side> = Side::all().filter(|side| side.is_open(&hull)).collect();
             let bounds = if open.is_empty() { Bounds::Within(hull) } else { Bounds::Unbounded };
-            FoundBounds { bounds, open }
+            FoundBounds { bounds, open, are_tight: is_tight }
         })
     }
 
     /// A box around the solid, which may reach to the ends of the search region; `None` for an empty solid.
-    fn hull(&self) -> Option<Aabb> {
+    fn hull(&self) -> Option<Found> {
         match self.parts_with_hulls() {
             Some(parts) => search(&Tree { words: parts.words.clone(), parts }),
             None => search(&WholeFormula::of(self, false)),

@@ -7,4 +7,6 @@ use super::search::Side;
 pub struct FoundBounds {
     pub bounds: Bounds,
     pub open: Vec<Side>,
+    /// Whether a point of the solid is known near each side of the bounds.
+    pub are_tight: bool,
 }

@@ -102,31 +102,41 @@ impl Side {
     }
 }
 
+/// A box around a solid, and whether a point of the solid is known near each of its sides.
+pub struct Found {
+    pub hull: Aabb,
+    pub is_tight: bool,
+}
+
 /// A box around a solid; `None` if it is proven to be empty.
-pub fn search<S: Shrink>(solid: &S) -> Option<Aabb> {
+pub fn search<S: Shrink>(solid: &S) -> Option<Found> {
     let mut hull = Aabb::new(DVec3::splat(-SEARCH_RADIUS), DVec3::splat(SEARCH_RADIUS));
     solid.shrink(&solid.everything(), &mut hull, Effort::Large)?;
     let mut cells = solid.parts(&hull);
     // a solid that does not end on one side need not be measured on the others
     let (open, closed): (Vec<Side>, Vec<Side>) = Side::all().partition(|side| side.is_open(&hull));
+    let mut is_tight = true;
     for side in open.into_iter().chain(closed) {
+        let mut is_near = false;
         // what is near enough is a part of the longest side, which may have been far too long
         for _ in 0..MOST_REPEATS {
             let longest = longest_side(&hull);
             let reach;
             (reach, cells) = Faces { solid, side, hull }.find(cells)?;
-            side.set(&mut hull, reach);
+            is_near = reach.is_near;
+            side.set(&mut hull, reach.farthest);
             let held = cells.iter().fold(Aabb::EMPTY, |held, (space, _)| held.union(space));
             hull = hull.intersection(&held);
             if longest_side(&hull) > 0.5 * longest {
                 break;
             }
         }
+        is_tight &= is_near;
         if side.is_open(&hull) {
             break;
         }
     }
-    Some(hull)
+    Some(Found { hull, is_tight })
 }
 
 /// The longest of the sides of a box that end, 0 if none does.
@@ -141,12 +151,19 @@ struct Faces<'a, S: Shrink> {
     hull: Aabb,
 }
 
-/// How far a solid reaches to one side, and cells that hold it, each with what is known of it there.
-type Reach<K> = (f64, Vec<(Aabb, K)>);
+/// How far a solid reaches to one side.
+struct Reach {
+    farthest: f64,
+    /// Whether a point of the solid is known to be almost as far out.
+    is_near: bool,
+}
+
+/// Boxes that hold a solid, each with what is known of it there.
+type Cells<K> = Vec<(Aabb, K)>;
 
 impl<S: Shrink> Faces<'_, S> {
     /// How far the solid reaches, and cells that hold it; `None` if there is no part of it.
-    fn find(&self, parts: Vec<(Aabb, S::Known)>) -> Option<Reach<S::Known>> {
+    fn find(&self, parts: Cells<S::Known>) -> Option<(Reach, Cells<S::Known>)> {
         let (side, hull) = (self.side, self.hull);
         let cell = |(space, known): (Aabb, S::Known)| {
             let space = space.intersection(&hull);
@@ -164,7 +181,7 @@ impl<S: Shrink> Faces<'_, S> {
                 found = found.max(self.farthest_point(&farthest, goal));
             }
             if farthest.rank - found <= goal || cells == CELLS_OF_SIDE || work == 0 {
-                let reach = farthest.rank;
+                let reach = Reach { farthest: farthest.rank, is_near: farthest.rank - found <= goal };
                 queue.push(farthest);
                 return Some((reach, queue.into_iter().map(|cell| (cell.space, cell.known)).collect()));
             }
