@@ -127,7 +127,8 @@ pub(super) struct Check {
     #[arg(long, value_name = "TIME", default_value_t = 0.0, value_parser = seconds, allow_negative_numbers = true)]
     pub time: f64,
     /// Time for measuring the solids of a file, in seconds or with a unit. Each gets an equal share, and what is left
-    /// goes to those for which it was too little. What is not finished then is left out, and said
+    /// goes to those for which it was too little. What is not finished then is left out, and said. It does not hold for
+    /// what scenes are asked, whose particles are placed
     #[arg(long, value_name = "TIME", default_value_t = 10.0, value_parser = seconds)]
     pub budget: f64,
     /// Treat warnings as errors: all of them (`warnings`), or those with a code (W0401); may be repeated
@@ -331,9 +332,10 @@ pub(super) struct Build {
     /// Whose sin, exp and so on are called
     #[arg(long, value_enum, default_value_t = BuildMath::System)]
     pub math: BuildMath,
-    /// Keep the params of the file as arguments of the functions, in a structure, instead of constants. ω keeps its
-    /// bits unless a param is an angle by which the solid is turned; then its last ones may differ. Gradients may round
-    /// differently
+    /// Keep the params of the file as arguments of the functions, in a structure, instead of constants. The sign and the
+    /// surface are those of the file with these values. ω has the same bits where params are lengths and factors; its last
+    /// ones may differ where a param is an angle of a rotation, and all of it off the surface where a param decides how
+    /// far a repeated, lofted, twisted or rounded shape reaches. Gradients may round differently
     #[arg(long)]
     pub runtime_params: bool,
     /// The machine of an object file, as in x86_64-apple-darwin [default: this one, with all that its processor has]
@@ -403,7 +405,7 @@ pub(super) struct Run {
     #[arg(long, help_heading = "Pictures", value_name = "X,Y,Z", value_parser = camera, allow_hyphen_values = true)]
     pub camera: Option<CameraFlag>,
     /// Cut obstacles open at a plane, the side towards the eye being taken away; `auto` cuts those that hide much of the
-    /// fluid, `none` none [default: the scene's, or auto]
+    /// fluid where it begins, `none` none [default: the scene's, or auto]
     #[arg(long, help_heading = "Pictures", value_name = "AXIS=VALUE|auto|none", value_parser = cut)]
     pub cut: Option<CutFlag>,
     /// Do not draw an obstacle; may be repeated

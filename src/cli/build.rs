@@ -36,6 +36,7 @@ pub(super) fn run(shared: &Shared, options: &Options) -> Result<(), Failure> {
         return Err(Failure::usage("--target is for .o files: source text is the same for all machines"));
     }
     let program = input::program(shared, &options.file)?;
+    output::keep_inputs(path)?;
     let solid = choose::solid(shared, &program, options.solid.as_deref())?;
     if let Some(diagnostics) = without_formulas(&program, &solid) {
         input::show(&diagnostics);
@@ -61,6 +62,7 @@ pub(super) fn run(shared: &Shared, options: &Options) -> Result<(), Failure> {
     };
     let beside = path.with_extension("h");
     if made.header.is_some() {
+        output::keep_inputs(&beside)?;
         may_replace(&beside)?;
     }
     output::write(path, |out| out.write_all(&made.bytes))?;

@@ -9,6 +9,7 @@
 //! interpreter bit for bit. Unsafe code of the crate lives here and in `solid::programs::compiled` only.
 
 mod emitter;
+mod entries;
 mod host_functions;
 mod machine;
 mod memory;
@@ -20,6 +21,7 @@ mod request;
 pub(crate) mod sine;
 mod translate;
 
+pub use entries::{Entry, EntryPrograms};
 pub use host_functions::Library;
 pub use machine::{CodegenError, target_description};
 pub(crate) use memory::Code;

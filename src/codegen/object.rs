@@ -5,13 +5,14 @@ use cranelift_module::{Linkage, default_libcall_names};
 use cranelift_object::{ObjectBuilder, ObjectModule};
 use rustc_hash::FxHashSet;
 
+use super::entries::{self, Entry};
 use super::host_functions::Library;
 use super::machine::{CodegenError, object_target, object_target_of};
 use super::request::Request;
 use super::sine;
 use super::translate::{Named, define, needed, waves};
 
-/// A program of an object file, under the name for the linker.
+/// A program of an object file, under a name that its own functions find.
 pub struct ObjectProgram<'a> {
     /// Name of the symbol.
     pub symbol: String,
@@ -19,14 +20,15 @@ pub struct ObjectProgram<'a> {
     pub request: Request<'a>,
 }
 
-/// Compiles programs into an object file, for this machine or for another one with the same kind of
-/// processor, named by its triple, for example `x86_64-apple-darwin`.
+/// Compiles programs and the functions over them into an object file, for this machine or for another one with the same
+/// kind of processor, named by its triple, for example `x86_64-apple-darwin`.
 ///
 /// # Errors
 /// [`CodegenError::Unsupported`] if there is no code generator for the machine; [`CodegenError::Bug`] if a
 /// generated function is refused.
 pub fn object(
     programs: &[ObjectProgram<'_>],
+    entries: &[Entry],
     library: Library,
     triple: Option<&str>,
 ) -> Result<Vec<u8>, CodegenError> {
@@ -56,8 +58,11 @@ pub fn object(
         }
     }
     for ObjectProgram { symbol, request } in programs {
-        let named = Named { name: symbol, linkage: Linkage::Export, library };
+        let named = Named { name: symbol, linkage: Linkage::Hidden, library };
         define(&mut module, *request, named, false)?;
+    }
+    for entry in entries {
+        entries::define(&mut module, entry)?;
     }
     module.finish().emit().map_err(|error| bug(&error))
 }

@@ -101,7 +101,7 @@ pub(super) fn define(
     if needed.iter().any(|&node| request.graph.expr(node) == Expr::Coordinate(Axis::T)) {
         return Err(CodegenError::Bug("time is in the graph of a program".into()));
     }
-    if named.linkage == Linkage::Export && request.graph.has_lookups(request.outputs) {
+    if named.linkage != Linkage::Local && request.graph.has_lookups(request.outputs) {
         return Err(CodegenError::Unsupported("a table cannot be written into an object file".into()));
     }
     let instructions = match request.shape {

@@ -4,6 +4,7 @@ use std::collections::BTreeSet;
 
 use super::c_blocks::Blocks;
 use super::c_folds::Folds;
+use super::c_header::{columns_name, function_name, guard, in_c};
 use super::c_room::Room;
 use super::language::{C, Function};
 use super::operations::{Names, Operation, WEIGHTED_FIELDS};
@@ -61,8 +62,9 @@ pub(super) fn source(file: &File<'_>, flavour: Flavour) -> Result<String, Source
     }
     lines.extend(writer.params());
     if flavour == Flavour::Unit {
+        // a compiler of C++ may be given a .c file, and its names must be those of the header
         lines.push(String::new());
-        lines.extend(writer.declarations());
+        lines.extend(in_c(writer.declarations()));
     }
     let mut operations: BTreeSet<(Operation, bool)> = BTreeSet::new();
     let mut called: BTreeSet<(Function, bool)> = BTreeSet::new();
@@ -92,23 +94,6 @@ pub(super) fn source(file: &File<'_>, flavour: Flavour) -> Result<String, Source
         lines.push("#endif".into());
     }
     Ok(lines.join("\n") + "\n")
-}
-
-/// The header of a translation unit.
-pub(super) fn header(file: &File<'_>) -> String {
-    let writer = CFile { file, flavour: Flavour::Unit };
-    let guard = format!("{}_H", file.prefix.to_uppercase());
-    let mut lines = vec!["/*".to_string()];
-    lines.extend(file.title().iter().map(|line| format!(" * {line}")));
-    lines.push(" */".into());
-    lines.extend([format!("#ifndef {guard}"), format!("#define {guard}"), String::new()]);
-    lines.extend(["#include <stddef.h>".to_string(), String::new()]);
-    lines.extend(["#ifdef __cplusplus", "extern \"C\" {", "#endif"].map(String::from));
-    lines.extend(writer.params());
-    lines.push(String::new());
-    lines.extend(writer.declarations());
-    lines.extend(["", "#ifdef __cplusplus", "}", "#endif", "", "#endif"].map(String::from));
-    lines.join("\n") + "\n"
 }
 
 /// A body of one program in one precision: what the functions for points and columns call.
@@ -180,7 +165,7 @@ impl CFile<'_> {
     pub fn macros(&self) -> Vec<String> {
         let mut lines: Vec<String> = Vec::new();
         if self.flavour != Flavour::Unit {
-            let guard = format!("{}_SOURCE_H", self.file.prefix.to_uppercase());
+            let guard = guard(self.file, "SOURCE_H");
             lines.extend([format!("#ifndef {guard}"), format!("#define {guard}")]);
         }
         lines.extend(
@@ -262,19 +247,15 @@ impl CFile<'_> {
         }
     }
 
-    fn function(&self, question: Question, precision: Precision) -> String {
-        format!("{}_{}{}", self.file.prefix, question.name(), C.suffix(precision))
-    }
-
     fn point_signature(&self, question: Question, precision: Precision) -> String {
-        let (number, name) = (C.number(precision), self.function(question, precision));
+        let (number, name) = (C.number(precision), function_name(self.file, question, precision));
         let results =
             if question == Question::Gradient { format!(", {number} gradient[3]") } else { String::new() };
         format!("{number} {name}({number} x, {number} y, {number} z{}{results})", self.extra_arguments())
     }
 
     pub fn columns_signature(&self, question: Question, precision: Precision) -> String {
-        let (number, name) = (C.number(precision), self.columns_name(question, precision));
+        let (number, name) = (C.number(precision), columns_name(self.file, question, precision));
         let points: Vec<String> = ["x", "y", "z"].map(|axis| format!("const {number} *{axis}")).to_vec();
         let results: Vec<String> = question.results().iter().map(|r| format!("{number} *{r}")).collect();
         format!(
@@ -285,11 +266,7 @@ impl CFile<'_> {
         )
     }
 
-    fn columns_name(&self, question: Question, precision: Precision) -> String {
-        format!("{}_{}_many{}", self.file.prefix, question.name(), C.suffix(precision))
-    }
-
-    fn declarations(&self) -> Vec<String> {
+    pub fn declarations(&self) -> Vec<String> {
         let mut lines = Vec::new();
         for program in self.file.programs {
             let question = program.question;
@@ -308,11 +285,8 @@ impl CFile<'_> {
             return Vec::new();
         }
         let precision = |single| if single { Precision::F32 } else { Precision::F64 };
-        let mut lines = vec![String::new()];
-        lines.extend(["#ifdef __cplusplus", "extern \"C\" {", "#endif"].map(String::from));
-        lines.extend(called.iter().map(|(function, single)| function.declaration(precision(*single))));
-        lines.extend(["#ifdef __cplusplus", "}", "#endif"].map(String::from));
-        lines
+        let declarations = called.iter().map(|(function, single)| function.declaration(precision(*single)));
+        std::iter::once(String::new()).chain(in_c(declarations)).collect()
     }
 
     /// The operations that the functions of a file call.
@@ -558,7 +532,7 @@ impl CFile<'_> {
     /// The kernel of CUDA for columns in the memory of the device.
     fn kernel(&self, program: &Program, precision: Precision) -> Vec<String> {
         let question = program.question;
-        let name = self.columns_name(question, precision);
+        let name = columns_name(self.file, question, precision);
         let kernel = name.replace("_many", "_kernel");
         let signature = self.columns_signature(question, precision).replace(&name, &kernel);
         let signature = signature.replace(&format!(", const {}_params *p", self.file.prefix), "");
@@ -568,7 +542,7 @@ impl CFile<'_> {
             format!(", {}_params params", self.file.prefix)
         };
         let signature = signature.replacen(')', &format!("{params})"), 1);
-        let (number, at) = (C.number(precision), self.function(question, precision));
+        let (number, at) = (C.number(precision), function_name(self.file, question, precision));
         let mut lines = vec![String::new(), "#ifdef __CUDACC__".into()];
         lines.push("/* Any number of threads: each takes every gridDim.x * blockDim.x-th point. */".into());
         lines.push(format!("static __global__ {signature} {{"));

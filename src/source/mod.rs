@@ -18,12 +18,13 @@
 //! | `operations` | R₀ and other operations that are functions of a file, each written once for all languages |
 //! | `statements` | a graph as a list of declarations |
 //! | `c`, `rust`, `shader` | whole files: heads, parameters, one point and columns |
+//! | `c_header` | the headers of C files and object files, and the names of functions |
 //! | `c_blocks`, `c_chunks` | long formulas of C in parts |
 //! | `c_folds`, `c_links` | long formulas of C as chains |
 //! | `c_calls`, `c_waves` | loops of C around the functions of the mathematical library, and its own sine and cosine |
 //! | `c_room` | the columns of blocks of points, and the tables of steps over them |
 //! | `march` | functions for a ray-marcher: sign, gradient and range of ω |
-//! | `object`, `c_object` | object code with its header |
+//! | `object` | object code with its header |
 //! | `names` | which names a file may use |
 //!
 //! Invariant: a text has the operations of the machine code in the same order and the same numbers, so C and Rust
@@ -34,8 +35,8 @@ mod c_blocks;
 mod c_calls;
 mod c_chunks;
 mod c_folds;
+mod c_header;
 mod c_links;
-mod c_object;
 mod c_room;
 mod c_waves;
 mod language;
@@ -248,7 +249,7 @@ pub fn write(solid: &Solid, target: Target, options: &Options) -> Result<Source,
     in_file(solid, target.is_shader(), options, |file| {
         let operations = file.programs.iter().map(Program::operations).max().unwrap_or(0);
         let (text, header) = match target {
-            Target::C => (c::source(file, c::Flavour::Unit)?, Some(c::header(file))),
+            Target::C => (c::source(file, c::Flavour::Unit)?, Some(c_header::header(file))),
             Target::Header => (c::source(file, c::Flavour::Header)?, None),
             Target::Cuda => (c::source(file, c::Flavour::Cuda)?, None),
             Target::Wgsl => (shader::source(file, &shader::WGSL)?, None),
@@ -301,8 +302,8 @@ struct File<'a> {
 }
 
 /// What a text says of its params.
-const PARAMS: &str =
-    "The params of the file, in SI units. Nothing checks them against the ranges that the file states.";
+const PARAMS: &str = "The params of the file, in SI units. Nothing checks them against the ranges that the file states. The surface is \
+     that of the file with these values; off it, omega may be another field where a param decides how far a shape reaches.";
 
 /// A param that is an argument, because the solid depends on it.
 struct OpenParam<'a> {

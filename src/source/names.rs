@@ -4,7 +4,7 @@ use super::{Param, SourceError};
 
 /// Words that some target language keeps for itself or defines, C, C++, CUDA, Rust, WGSL and GLSL ES among them, and
 /// names that the functions of a file use.
-const TAKEN: &str = "abstract active alias alignas alignof and and_eq array as asm asm_fragment assert async atomic attribute \
+const TAKEN: &str = "I abstract active alias alignas alignof and and_eq array as asm asm_fragment assert async atomic attribute \
     auto await become bitand bitor bool box break bvec2 bvec3 bvec4 case cast catch centroid char char16_t \
     char32_t char8_t class co_await co_return co_yield coherent column_major common compile compile_fragment \
     compl complex concept const const_assert const_cast consteval constexpr constinit continue continuing \
@@ -13,13 +13,13 @@ const TAKEN: &str = "abstract active alias alignas alignof and and_eq array as a
     fallthrough false far filter final finally fixed flat float fn for friend from fvec2 fvec3 fvec4 fxgroup \
     gen get goto groupshared half highp hvec2 hvec3 hvec4 i i32 i386 i64 if imaginary impl implements import \
     in inline inout input instanceof int interface invariant isampler2D isampler3D ivec2 ivec3 ivec4 layout \
-    let linux long loop lowp macro macro_rules main mat2 mat3 mat4 match math mediump meta mod module move \
+    let linux long loop lowp macro macro_rules main mat2 mat3 mat4 match math math_errhandling mediump meta mod module move \
     mut mutable n namespace near new nil noexcept noinline nointerpolation non_coherent noncoherent \
-    noperspective not not_eq null nullptr of operator or or_eq out output override p package packoffset \
+    noperspective noreturn not not_eq null nullptr of operator or or_eq out output override p package packoffset \
     partition pass patch pixelfragment precise precision premerge priv private protected ptr pub public \
     readonly ref regardless register reinterpret_cast require requires resource restrict return sample \
-    sampler sampler2D sampler3D samplerCube self Self set shared short signed sizeof smooth snorm static \
-    static_assert static_cast std struct subroutine super superp switch t target template texture this \
+    sampler sampler2D sampler3D samplerCube self Self set shared short signed sizeof small smooth snorm static \
+    static_assert static_cast std stderr stdin stdout struct subroutine super superp switch t target template texture this \
     thread_local throw trait true try type typedef typeid typename typeof u u32 u64 uint uniform union unix \
     unless unorm unsafe unsigned unsized usampler2D usampler3D use using uvec2 uvec3 uvec4 var varying vec \
     vec2 vec3 vec4 virtual void volatile wchar_t wgsl where while with writeonly x xor xor_eq y yield z";
@@ -84,7 +84,10 @@ mod tests {
             .map(|name| Param { name: (*name).into(), value: 1.0, doc: None })
             .collect();
         assert_eq!(fields(&params), ["side", "in_param", "param_2", "x_param", "param_2_4"]);
-        for taken in ["module", "NULL", "M_PI", "vec3", "Self", "linux", "mat4", "std", "shared"] {
+        for taken in [
+            "module", "NULL", "M_PI", "vec3", "Self", "linux", "mat4", "std", "shared", "I", "stdin",
+            "stdout", "stderr",
+        ] {
             let param = Param { name: taken.into(), value: 1.0, doc: None };
             assert_eq!(fields(&[param]), [format!("{taken}_param")]);
         }

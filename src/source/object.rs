@@ -1,9 +1,12 @@
-//! A solid as object code: the machine code of its programs, and a header that makes them functions of C.
+//! A solid as object code: the functions that a C file would have, and their header.
 
-use super::c_object;
+use super::c_header::{columns_name, function_name, object_header};
+use super::language::C;
 use super::program::Program;
 use super::{File, Math, Options, SourceError, in_file};
-use crate::codegen::{self, CodegenError, Forms, Library, ObjectProgram, Request, Shape};
+use crate::codegen::{
+    self, CodegenError, Entry, EntryPrograms, Forms, Library, ObjectProgram, Request, Shape,
+};
 use crate::ir::{Axis, Expr, Graph, Node};
 use crate::precision::Precision;
 use crate::solid::Solid;
@@ -49,7 +52,7 @@ pub fn object(solid: &Solid, options: &Options, triple: Option<&str>) -> Result<
         let uniforms: Vec<Option<(Graph, Vec<Node>)>> =
             file.programs.iter().map(|program| time_as_x(file, program)).collect();
         let no_forms = Forms::default();
-        let mut programs = Vec::new();
+        let (mut programs, mut entries) = (Vec::new(), Vec::new());
         for (program, uniforms) in file.programs.iter().zip(&uniforms) {
             if let Some((graph, roots)) = uniforms {
                 let request = Request {
@@ -62,7 +65,7 @@ pub fn object(solid: &Solid, options: &Options, triple: Option<&str>) -> Result<
                     parameters: !file.params.is_empty(),
                     uniforms: false,
                 };
-                programs.push(ObjectProgram { symbol: c_object::raw_uniforms(file, program), request });
+                programs.push(ObjectProgram { symbol: raw_uniforms(file, program), request });
             }
             for &precision in file.precisions {
                 for shape in [Shape::Point, Shape::Batch] {
@@ -77,20 +80,47 @@ pub fn object(solid: &Solid, options: &Options, triple: Option<&str>) -> Result<
                         uniforms: program.uniforms.is_some(),
                     };
                     let blocks = shape == Shape::Batch;
-                    let symbol = c_object::raw_name(file, program, precision, blocks);
+                    let symbol = raw_name(file, program, precision, blocks);
                     programs.push(ObjectProgram { symbol, request });
                 }
+                entries.push(entry(file, program, precision));
             }
         }
         let library = match file.options.math {
             Math::System => Library::System,
             Math::Rfm => Library::Rfm,
         };
-        let bytes = codegen::object(&programs, library, triple).map_err(ObjectError::Codegen)?;
+        let bytes = codegen::object(&programs, &entries, library, triple).map_err(ObjectError::Codegen)?;
         let operations = file.programs.iter().map(Program::operations).max().unwrap_or(0);
-        Ok(Object { bytes, header: c_object::object_header(file), operations })
+        Ok(Object { bytes, header: object_header(file), operations })
     })
     .map_err(ObjectError::Source)?
+}
+
+/// The name of the machine code of a program in an object file: for one point, or for blocks of points.
+fn raw_name(file: &File<'_>, program: &Program, precision: Precision, blocks: bool) -> String {
+    let blocks = if blocks { "_blocks" } else { "" };
+    format!("{}_raw_{}{blocks}{}", file.prefix, program.question.name(), C.suffix(precision))
+}
+
+/// The name of the machine code that finds what depends on time and params alone.
+fn raw_uniforms(file: &File<'_>, program: &Program) -> String {
+    format!("{}_raw_uniforms_{}", file.prefix, program.question.name())
+}
+
+/// The functions that others call, over the machine code of a program.
+fn entry(file: &File<'_>, program: &Program, precision: Precision) -> Entry {
+    let uniforms = program.uniforms.is_some().then(|| (raw_uniforms(file, program), program.uniform_count()));
+    let [point, blocks] = [false, true].map(|blocks| raw_name(file, program, precision, blocks));
+    Entry {
+        point: function_name(file, program.question, precision),
+        columns: columns_name(file, program.question, precision),
+        precision,
+        results: program.question.results().len(),
+        moves: file.moves,
+        params: !file.params.is_empty(),
+        programs: EntryPrograms { point, blocks, uniforms },
+    }
 }
 
 /// The formulas of a program's uniforms as a program of its own: time stands in the place of x, and the params are

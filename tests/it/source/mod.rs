@@ -408,6 +408,55 @@ fn params_that_stay_constant_are_named_in_the_text() {
     assert!(open.contains("double b;") && !open.contains("double a;"));
 }
 
+/// A host in C for files with params: it prints what `say` asks.
+fn printed(workshop: &Workshop, compiler: &str, headers: &[&str], files: &[&str], say: &str) -> String {
+    let includes: String = headers.iter().map(|header| format!("#include \"{header}\"\n")).collect();
+    let host =
+        format!("#include <complex.h>\n{includes}#include <stdio.h>\nint main(void) {{ {say} return 0; }}\n");
+    workshop.write("host.c", host);
+    compile(compiler, workshop.path(), &[&["-o", "host", "host.c"], files, &["-lm"]].concat());
+    let run = std::process::Command::new(workshop.path().join("host")).output().unwrap();
+    String::from_utf8(run.stdout).unwrap()
+}
+
+/// A factor of params scales ω and moves no surface.
+#[test]
+fn distances_of_params_are_those_of_constants() {
+    if !is_here("gcc") {
+        return;
+    }
+    let workshop = Workshop::new();
+    workshop.write("el.rfm", "rfm 1\nparam a = 0.9\nsolid s = ellipsoid(a, 1, 0.3)\n");
+    workshop.write("tt.rfm", "rfm 1\nparam I = 0.5\nsolid T = (1 + t)*sphere(2*I)\n");
+    for (file, solid, output) in
+        [("el.rfm", "s", "s.c"), ("el.rfm", "s", "s_o.o"), ("tt.rfm", "T", "big.c"), ("tt.rfm", "T", "t.c")]
+    {
+        let prefix = if output == "t.c" { "t" } else { output.split('.').next().unwrap() };
+        let arguments = ["build", file, "-s", solid, "--what", "distance", "--runtime-params", "-o", output];
+        rfm(
+            workshop.path(),
+            &[&arguments[..], &["--prefix", if prefix == "big" { "T" } else { prefix }]].concat(),
+        )
+        .expect(0);
+    }
+    let say = "printf(\"%.9f %.9f %.9f %.9f\", s_distance(2,0,0,&s_defaults), s_o_distance(2,0,0,&s_o_defaults), \
+               T_distance(2,0,0,0.5,&T_defaults), t_distancef(2,0,0,0.5,&t_defaults));";
+    let found =
+        printed(&workshop, "gcc", &["s.h", "s_o.h", "big.h", "t.h"], &["s.c", "s_o.o", "big.c", "t.c"], say);
+    assert_eq!(found, "1.100000000 1.100000000 1.000000000 1.000000000");
+    if is_here("g++") {
+        // which takes all of these files for C++
+        let found = printed(
+            &workshop,
+            "g++",
+            &["s.h", "s_o.h"],
+            &["s.c", "s_o.o"],
+            "printf(\"%.3f\", s_omega(0,0,0,&s_defaults));",
+        );
+        assert!(found.parse::<f64>().unwrap() > 0.0, "{found}");
+    }
+}
+
 /// ω and signs to the bit. The sums of a gradient have another order where params are no constants, and at creases any
 /// member of its limits is as good.
 #[test]
@@ -463,14 +512,9 @@ fn an_object_file_is_linked_into_a_c_host_and_has_the_bits_of_rfm() {
         let prefix = format!("s{i}");
         let made = source::object(solid, &exact(&prefix), None).unwrap_or_else(|e| panic!("{e}"));
         workshop.write(&format!("{prefix}.o"), &made.bytes);
-        // the functions of a header are its own: these are for others to find
-        let header = made
-            .header
-            .replace("static inline void s", "void s")
-            .replace("static inline double s", "double s");
-        let header = header.replace("static inline float s", "float s");
         workshop.write(&format!("{prefix}.h"), made.header);
-        workshop.write(&format!("{prefix}_host.c"), header);
+        // its own symbols are those of the header, which only declares them
+        workshop.write(&format!("{prefix}_host.c"), format!("#include \"{prefix}.h\"\n"));
         files.extend([format!("{prefix}.o"), format!("{prefix}_host.c")]);
     }
     let files: Vec<&str> = files.iter().map(String::as_str).collect();

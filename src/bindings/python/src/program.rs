@@ -228,6 +228,7 @@ impl PyProgram {
         let name = match (name, &this.program.module().solids[..]) {
             (Some(name), _) => name,
             (None, [only]) => &only.name,
+            (None, []) => return Err(crate::error::refused("the file defines no solid")),
             (None, several) => {
                 let names: Vec<&str> = several.iter().map(|solid| &*solid.name).collect();
                 let message = format!("name one of the solids of the file: {}", names.join(", "));
