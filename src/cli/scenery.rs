@@ -3,7 +3,7 @@
 use glam::{BVec3, DVec3};
 
 use super::failure::{Failure, note};
-use rfm::geom::Aabb;
+use rfm::geom::{Aabb, to_thousandths};
 use rfm::mesh::{Mesh, split_creases};
 use rfm::render::{self, Backdrop, Camera, Cut, Legend, Material, MeshView};
 use rfm::slice::Plane;
@@ -40,6 +40,17 @@ pub(super) fn camera(
         (None, None) => camera,
         (at, zoom) => camera.aimed(at.unwrap_or(domain.centre()), zoom.unwrap_or(1.0)),
     })
+}
+
+/// Notes a place that a flag puts into the middle of a picture, and that lies outside of the box which is drawn.
+pub(super) fn tell_of_aim(domain: &Aabb, look_at: Option<DVec3>) {
+    if let Some(at) = look_at.filter(|at| at.is_finite() && !domain.contains(*at)) {
+        note(format!(
+            "the place to look at, {at}, lies outside of the box that is drawn, {} to {}: its pictures may be empty",
+            to_thousandths(domain.min),
+            to_thousandths(domain.max)
+        ));
+    }
 }
 
 /// The scene of a picture without its particles: the box, the obstacles, the legend.

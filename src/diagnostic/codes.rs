@@ -91,7 +91,8 @@ TOO_LARGE = "E0210":
 more, or what --max-nodes says. A range such as `0..1000000` may have too many members.";
 OVERRIDE = "E0211":
 "A param is set that the file does not declare with `param name = …`, or to a value outside the range that the declaration
-states, or with another unit. Params are set by `-D name=value`, by files that `-P` names, or by a program.";
+states, or with a unit of another kind than the one that the file states. Where the file states none, any unit is accepted. Params
+are set by `-D name=value`, by files that `-P` names, or by a program.";
 UNIT_MISMATCH = "E0212":
 "The unit does not fit what is measured here: a density needs kg/m^3, a time s, an angle deg or rad. Inside shapes
 only lengths and angles are meaningful.";
@@ -391,7 +392,7 @@ NOTHING_COMPARED = "W0521":
 flow is compared with it.";
 FLUID_OF_TIME = "W0522":
 "The fluid's `shape` says where the fluid is at the start. Its particles are placed once, at t = 0, so a formula with the time `t`
-has no effect on them later. Obstacles and the container may move; a fluid gets its motion from its `velocity`, from gravity and
+has no effect on them later, and the same holds of its `velocity`. Obstacles and the container may move; a fluid gets its motion from its `velocity`, from gravity and
 from them.";
 CLAMPED = "W0523":
 "In a fluid that fills all its room, wcsph takes gradients by differences and keeps negative pressures, because only
@@ -402,6 +403,9 @@ NO_FRICTION = "W0524":
 "With the paper's method walls act on the positions and velocities of particles that reach them, and have no viscous
 force on the fluid. `walls: no_slip`, or that of an obstacle, changes nothing then: oil between two plates falls freely.
 `friction` and `restitution` act where a particle hits a wall. The other methods know `no_slip`.";
+PICTURE_ASIDE = "W0525":
+"`look_at` in the block `picture` is the place in the middle of the pictures, in metres. It lies outside of the box, where nothing
+is drawn, so pictures may be empty. Left out, it is the middle of the box; `zoom` makes what is there larger.";
 OBSTACLE_FILLS_BOX = "E0502":
 "The obstacle covers every place where fluid was to be put: nothing is left to simulate.";
 }

@@ -310,7 +310,7 @@ fn too_small_a_support(scene: &Scene, h: f64, spacing: f64) -> Diagnostic {
         "`support_radius` is {h:.2e} m, and particles are {spacing:.2e} m apart: none has a neighbour"
     );
     let usual = scene.method.support(scene.fluid.surface_tension > 0.0).radius(spacing);
-    Diagnostic::error(Code::OUT_OF_RANGE, scene.fluid.size_span.unwrap_or(scene.fluid.shape_span), message)
+    Diagnostic::error(Code::OUT_OF_RANGE, scene.fluid.support_span.unwrap_or(scene.fluid.span), message)
         .help(format!("leave it out: here it would be {usual:.2e} m"))
 }
 

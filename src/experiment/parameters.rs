@@ -6,7 +6,7 @@ use super::{fall, vector_field, velocities};
 use crate::diagnostic::{Code, Diagnostic};
 use crate::ir::Node;
 use crate::lower::{Gravity, Scene};
-use crate::sph::{ClampedBy, Method, Parameters, Slip};
+use crate::sph::{ClampedBy, Method, Parameters, Slip, VISCOSITY};
 use crate::{Program, Solid};
 
 /// The length of a simulation's steps, and where it comes from.
@@ -221,6 +221,7 @@ pub(super) fn many_steps(scene: &Scene, parameters: &Parameters) -> Option<Diagn
     let (shortest, cause) = parameters.shortest_step(parameters.expected_speed);
     let (step, cause, at) = match scene.run.dt {
         Some(dt) => (dt, "`dt`", scene.run.dt_span.unwrap_or(scene.span)),
+        None if cause == VISCOSITY => (shortest, cause, scene.fluid.viscosity_span.unwrap_or(scene.span)),
         None => (shortest, cause, scene.span),
     };
     // steps end at frames
@@ -228,8 +229,15 @@ pub(super) fn many_steps(scene: &Scene, parameters: &Parameters) -> Option<Diagn
         if scene.run.save_every < step { (scene.run.save_every, "`save_every`") } else { (step, cause) };
     let steps = scene.run.until / step;
     (steps >= MANY_STEPS).then(|| {
+        let of = match cause == VISCOSITY {
+            true => format!(
+                " of {:?} Pa·s at a density of {:?} kg/m³",
+                scene.fluid.viscosity, scene.fluid.density
+            ),
+            false => String::new(),
+        };
         let message =
-            format!("the run takes about {steps:.0e} steps of {step:.1e} s, which {cause} asks for");
+            format!("the run takes about {steps:.0e} steps of {step:.1e} s, which {cause}{of} asks for");
         Diagnostic::warning(Code::MANY_STEPS, at, message).help(
             "`rfm run --dry-run` tells how long that is; look for a number in another unit than was meant",
         )

@@ -263,7 +263,17 @@ impl Lowering<'_> {
             Value::Failed => None,
             Value::List(members) => {
                 let span = self.user_span(span);
-                let message = format!("a vector has three components, found {}", members.len());
+                let strange = members.iter().position(|member| !matches!(member, Value::Number(_)));
+                let message = match (strange, &members[..]) {
+                    (Some(at), [_, _, _]) => {
+                        let which = ["first", "second", "third"][at];
+                        format!(
+                            "the {which} component of a vector is a number, found {}",
+                            members[at].describe()
+                        )
+                    }
+                    _ => format!("a vector has three components, found {}", members.len()),
+                };
                 self.report(Diagnostic::error(Code::WRONG_TYPE, span, message));
                 None
             }

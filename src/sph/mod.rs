@@ -81,6 +81,7 @@ pub use error::{Cause, ParameterError, Quantity, SetupError, StepError};
 pub use kernel::Kernels;
 pub use methods::*;
 pub use params::Parameters;
+pub(crate) use params::VISCOSITY;
 pub use particles::{Particles, Vectors};
 pub use pass::Pass;
 pub use probes::{Gauge, Probe};

@@ -86,6 +86,9 @@ impl Default for Parameters {
     }
 }
 
+/// What the viscosity is called as a limit of steps, see [`Parameters::shortest_step`].
+pub(crate) const VISCOSITY: &str = "viscosity";
+
 impl Parameters {
     /// Water at 20 °C in particles with this spacing, m. Viscosity, surface tension, support radius,
     /// precision and steps are the defaults of the method, as in a scene that states none of them. Walls let
@@ -245,7 +248,7 @@ impl Parameters {
         let (numerics, scales) = (self.method.numerics(), self.scales());
         let limits = [
             (numerics.courant_dt(&scales, max_speed), "the speeds of sound and of the fluid"),
-            (numerics.viscous_dt(&scales), "viscosity"),
+            (numerics.viscous_dt(&scales), VISCOSITY),
             (numerics.capillary_dt(&scales), "surface tension"),
             (self.force_dt(self.gravity.length()), "gravity"),
         ];

@@ -24,11 +24,10 @@ pub(super) struct Slip<'t> {
 impl<'t> Slip<'t> {
     /// The message for this slip; `None` if it is not one of those known here.
     pub fn explained(&self) -> Option<Diagnostic> {
-        if let Some(diagnostic) = self.unit_taken_for_a_key() {
-            return Some(diagnostic);
-        }
-        if let Some(diagnostic) = self.import() {
-            return Some(diagnostic);
+        let first = self.item_in_braces().or_else(|| self.unit_of_a_vector());
+        let first = first.or_else(|| self.unit_taken_for_a_key()).or_else(|| self.import());
+        if first.is_some() {
+            return first;
         }
         if matches!(last_word(self.on_its_line().trim_end()), "when" | "case") {
             return Some(self.syntax("a choice is written with `if`").help(foreign::CONDITION));
@@ -398,6 +397,9 @@ impl<'t> Slip<'t> {
             ";" => "leave it out: an item ends where the next one begins",
             "\"" if after.split_once('"').is_some_and(|(_, rest)| rest.trim_start().starts_with(':')) => {
                 "a key has no quotes, as in `density: 1000`"
+            }
+            "\"" if after.lines().next().is_some_and(|line| line.contains('"')) => {
+                return Some(self.text_in_a_wrong_place());
             }
             "\"" => {
                 return Some(

@@ -55,6 +55,24 @@ fn shares(picture: &Path) -> [f64; 4] {
 }
 
 #[test]
+fn pictures_of_solids_say_what_they_do_not_show() {
+    let folder = tempfile::tempdir().unwrap();
+    let here = folder.path();
+    std::fs::write(
+        here.join("thin.rfm"),
+        "rfm 1\nsolid thin = sphere(1) or box([0, -0.5, 0], [3, 0.5, 0.004])\n",
+    )
+    .unwrap();
+    let drawn = rfm(here, &["render", "thin.rfm", "--size", "320x180"]).expect(0);
+    assert!(drawn.stderr.contains("--mesh-cells"), "{}", drawn.stderr);
+    std::fs::write(here.join("ball.rfm"), "rfm 1\nsolid ball = sphere(1)\n").unwrap();
+    let drawn = rfm(here, &["render", "ball.rfm", "--size", "320x180"]).expect(0);
+    assert!(!drawn.stderr.contains("note"), "{}", drawn.stderr);
+    let aside = rfm(here, &["render", "ball.rfm", "--size", "320x180", "--look-at", "100,0,0"]).expect(0);
+    assert!(aside.stderr.contains("lies outside of the box that is drawn"), "{}", aside.stderr);
+}
+
+#[test]
 fn every_frame_becomes_a_picture_with_the_same_bytes_on_any_number_of_threads() {
     let folder = tempfile::tempdir().unwrap();
     let here = folder.path();

@@ -224,6 +224,8 @@ fn what_is_only_moved_has_one_mesh_and_surfaces_of_the_fluid_are_shown() {
     assert_eq!(of(&blocks(&broken.stdout), "frame").len(), 11);
     assert!(!here.join("-").exists());
     rfm(here, &["view", "drop.out", "--save", "-", "--json"]).expect(2);
+    let wrong = rfm(here, &["view", "drop.out", "--save", "page.pdf"]).expect(2);
+    assert!(wrong.stderr.contains("does not end in .html") && !here.join("page.pdf").exists());
 }
 
 #[test]

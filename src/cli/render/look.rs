@@ -43,6 +43,7 @@ impl<'a> Look<'a> {
         if look_at.is_some_and(|at| !at.is_finite()) {
             return Err(Failure::usage("--look-at: expected three finite lengths"));
         }
+        scenery::tell_of_aim(domain, options.look_at);
         let zoom = options.zoom.or(stated.zoom());
         scenery::camera(domain, vector(stated.camera), (look_at, zoom), options.size)
     }

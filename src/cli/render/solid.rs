@@ -6,7 +6,7 @@ use rayon::prelude::*;
 
 use super::film::{Kind, Target};
 use super::options::Render;
-use crate::cli::failure::Failure;
+use crate::cli::failure::{Failure, note};
 use crate::cli::output::{Shown, counted};
 use crate::cli::run::bodies::Bodies;
 use crate::cli::scenery::{self, Drawn, half_towards_eye, opened_by};
@@ -41,6 +41,7 @@ pub(super) fn run(shared: &Shared, options: &Render) -> Result<(), Failure> {
     let program = input::program(shared, path)?;
     let solid = choose::solid(shared, &program, options.solid.as_deref())?;
     let path = options.output.clone().unwrap_or_else(|| PathBuf::from(format!("{}.png", solid.name())));
+    output::keep_inputs(&path)?;
     let target = options.target(path)?;
     match target.kind {
         Kind::Png => picture(shared, options, &solid, &target),
@@ -61,7 +62,9 @@ fn picture(shared: &Shared, options: &Render, solid: &Solid, target: &Target) ->
     let solid = choose::at(solid, options.time.unwrap_or(0.0));
     let name = solid.name().to_string();
     let domain = room(std::slice::from_ref(&solid))?;
-    let mesh = mesh(solid, domain, options)?;
+    let bodies = bodies(solid, domain, options);
+    let mesh = Mesh::joined(&bodies.meshes_at(options.time.unwrap_or(0.0))?);
+    tell_of_thin_parts(&bodies, options)?;
     let (camera, drawn) = seen(options, &domain)?;
     let title = title(options, &name, drawn);
     let legend = Legend { title: &title, scale: None };
@@ -162,10 +165,23 @@ fn room(moments: &[Solid]) -> Result<Aabb, Failure> {
     }
 }
 
+fn bodies(solid: Solid, domain: Aabb, options: &Render) -> Bodies {
+    Bodies::of(vec![solid], domain, options.mesh_cells.unwrap_or(CELLS))
+}
+
 fn mesh(solid: Solid, domain: Aabb, options: &Render) -> Result<Mesh, Failure> {
     let time = solid.time();
-    let bodies = Bodies::of(vec![solid], domain, options.mesh_cells.unwrap_or(CELLS));
-    Ok(Mesh::joined(&bodies.meshes_at(time)?))
+    Ok(Mesh::joined(&bodies(solid, domain, options).meshes_at(time)?))
+}
+
+/// Notes what is too thin for the cells of the mesh that is drawn.
+fn tell_of_thin_parts(bodies: &Bodies, options: &Render) -> Result<(), Failure> {
+    for missed in bodies.missed_at(options.time.unwrap_or(0.0))? {
+        note(format!(
+            "the picture does not show all of what is thinner than two cells: {missed}; --mesh-cells sets how many there are"
+        ));
+    }
+    Ok(())
 }
 
 /// From where a solid is seen, and how it is drawn.
@@ -201,5 +217,6 @@ pub(super) fn camera(options: &Render, domain: &Aabb) -> Result<Camera, Failure>
     let flag = options.camera;
     let look_at = options.look_at.or(flag.and_then(|flag| flag.look_at));
     let zoom = options.zoom.or(flag.and_then(|flag| flag.zoom));
+    scenery::tell_of_aim(domain, look_at);
     scenery::camera(domain, flag.map(|flag| flag.towards_eye), (look_at, zoom), options.size)
 }

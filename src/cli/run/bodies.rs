@@ -15,6 +15,9 @@ use rfm::{Experiment, Solid};
 /// Bodies that are smaller than this part of the box are drawn as nothing.
 const LEAST_BODY: f64 = 1e-9;
 
+/// A box that is longer than a body by this factor has room for it within the tolerances of its own size.
+const FAR_LARGER: f64 = 1e6;
+
 /// The solids of a scene.
 pub(in crate::cli) struct Bodies {
     solids: Vec<Solid>,
@@ -71,10 +74,43 @@ impl Bodies {
                     "whether the mesh of the obstacle `{name}` misses what is thin was not found out in time"
                 ));
             } else if mesh.triangles.is_empty() {
-                note(format!("the obstacle `{name}` has no surface in the box"));
+                note(self.why_empty(solid));
             }
         }
         Ok(meshes)
+    }
+
+    /// What is said of a solid whose mesh has no triangles, although nothing of it is too thin for its cells.
+    fn why_empty(&self, solid: &Solid) -> String {
+        let (name, room) = (solid.name(), self.domain.size().max_element());
+        let bounds = solid.at(0.0).bounds().aabb();
+        let lies_within = |bounds: &Aabb| {
+            !bounds.intersection(&self.domain).is_empty() && solid.range(&self.domain).hi > 0.0
+        };
+        match bounds.filter(lies_within).map(|bounds| bounds.size().max_element()) {
+            Some(size) if room > FAR_LARGER * size => format!(
+                "the mesh and the pictures show nothing of the obstacle `{name}`: it is {size:.1e} m long, and the box {room:.1e} m; \
+                 is a number of the box in another unit than was meant?"
+            ),
+            _ => format!("the obstacle `{name}` has no surface in the box"),
+        }
+    }
+
+    /// What the meshes at a time, s, do not show, in words, for each solid of which something was found in a while. Sharp
+    /// edges are left out.
+    pub fn missed_at(&self, time: f64) -> Result<Vec<String>, Failure> {
+        let mut missed = Vec::new();
+        for solid in &self.solids {
+            let solid = solid.at(time);
+            let grid = self.grid(&solid)?;
+            let surface = solid.surface(*grid.bounds());
+            let thin =
+                mesh::thin_cells(&*surface, &grid, &Deadline::after(LEAST_SEARCH)).map_err(Failure::usage)?;
+            if thin.count > 0 && !thin.is_wedge {
+                missed.push(hidden(&thin, &grid));
+            }
+        }
+        Ok(missed)
     }
 
     /// The mesh of each solid at a time, s, cut off at the box.

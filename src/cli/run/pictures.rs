@@ -239,7 +239,10 @@ fn moving(domain: &Aabb, bodies: &[Body], meshes: &[Mesh]) -> Vec<(Drawn, Mesh)>
 fn camera(look: Look<'_>, experiment: &Experiment, size: (u32, u32)) -> Result<Camera, Failure> {
     let stated = &experiment.scene().picture;
     let (towards_eye, aim) = match look.camera {
-        Some(flag) => (Some(flag.towards_eye), (flag.look_at, flag.zoom)),
+        Some(flag) => {
+            scenery::tell_of_aim(&experiment.domain(), flag.look_at);
+            (Some(flag.towards_eye), (flag.look_at, flag.zoom))
+        }
         None => (stated.camera, (stated.look_at, stated.zoom)),
     };
     scenery::camera(&experiment.domain(), towards_eye, aim, size)

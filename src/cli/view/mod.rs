@@ -93,6 +93,13 @@ fn save(shared: &Shared, run: &SavedRun, target: &Path) -> Result<(), Failure> {
         run.write(&mut std::io::stdout().lock())?;
         return Ok(());
     }
+    let ending = target.extension().map(|ending| ending.to_string_lossy().to_lowercase());
+    if ending.is_none_or(|ending| !matches!(ending.as_str(), "html" | "htm")) {
+        return Err(Failure::usage(format!(
+            "--save writes a page, and `{}` does not end in .html",
+            target.shown()
+        )));
+    }
     let mut sizes = None;
     output::write(target, |out| {
         sizes = Some(run.write(out)?);

@@ -163,7 +163,7 @@ impl<'a> Lowering<'a> {
         let shape = match block.setting(keys::SHAPE.name) {
             Some((_, value)) => self.shape(value).map(|node| {
                 self.warn_of_constant("the fluid's shape", node, value);
-                self.warn_of_time(node, value.span);
+                self.warn_of_time("shape", &[node], value.span);
                 (node, value.span)
             }),
             None => {
@@ -187,6 +187,7 @@ impl<'a> Lowering<'a> {
         let seed = self.count_key(block, &keys::SEED);
         let (shape, shape_span) = shape?;
         let Resolution { density, mass, size_span, support_radius } = resolution?;
+        let stated_at = |key: &SceneKey| block.setting(key.name).map(|(_, value)| value.span);
         let particles = particles?.or(defaults.particles.filter(|_| size_span.is_none()));
         Some(Fluid {
             name: block.label.map_or_else(|| "fluid".into(), |label| label.text.clone()),
@@ -203,22 +204,32 @@ impl<'a> Lowering<'a> {
             surface_tension: tension?,
             tension_span: block.setting(keys::SURFACE_TENSION.name).map(|(_, value)| value.span),
             support_radius,
+            viscosity_span: stated_at(&keys::VISCOSITY).or(stated_at(&keys::DENSITY)),
+            support_span: stated_at(&keys::SUPPORT_RADIUS),
+            velocity_span: stated_at(&keys::VELOCITY),
             velocity: velocity?,
             jitter: jitter?,
             seed: seed?? as u64,
         })
     }
 
-    /// Warns of a fluid's shape that depends on the time: particles are placed once.
-    fn warn_of_time(&mut self, shape: Node, at: Span) {
-        if self.module.graph.uses(shape, Axis::T) {
-            let message = "the fluid's shape depends on the time, and particles are placed once";
-            self.report(
-                Diagnostic::warning(Code::FLUID_OF_TIME, at, message)
-                    .at("its shape at t = 0 is filled")
-                    .help("to bring the fluid into motion, state its `velocity` or move an obstacle"),
-            );
+    /// Warns of a fluid's shape or velocity that depends on the time: particles are placed once.
+    pub(super) fn warn_of_time(&mut self, what: &str, nodes: &[Node], at: Span) {
+        if !nodes.iter().any(|&node| self.module.graph.uses(node, Axis::T)) {
+            return;
         }
+        let (label, help) = match what {
+            "velocity" => (
+                "its velocity at t = 0 is that of the particles",
+                "what drives the fluid later is `gravity`, which may depend on the time, or an obstacle that moves",
+            ),
+            _ => (
+                "its shape at t = 0 is filled",
+                "to bring the fluid into motion, state its `velocity` or move an obstacle",
+            ),
+        };
+        let message = format!("the fluid's {what} depends on the time, and particles are placed once");
+        self.report(Diagnostic::warning(Code::FLUID_OF_TIME, at, message).at(label).help(help));
     }
 
     /// Reads density, mass and support radius of the particles. A spacing may replace the mass.

@@ -78,6 +78,47 @@ fn blocks_with(key: &str, declared: &[SceneKey]) -> Vec<&'static str> {
     declared.iter().filter(has_key).map(|block| block.name).collect()
 }
 
+/// What there is to say to `size` in a box: `max` is the corner that lies that far from `min`.
+fn size_of_box(diagnostic: Diagnostic, entries: &[Entry], size: &Entry) -> Diagnostic {
+    let vector = |entry: &Entry| match entry {
+        Entry::Setting { value, .. } => plain_vector(value),
+        Entry::Block { .. } => None,
+    };
+    let min = entries.iter().find(|entry| entry.key().text == "min");
+    let written = |[x, y, z]: [f64; 3]| format!("max: [{x}, {y}, {z}]");
+    match (min.map(vector), vector(size)) {
+        (None, Some(size)) => diagnostic.help(format!(
+            "a box begins at `min`, which is [0, 0, 0] unless stated, and ends at `max`: write `{}`",
+            written(size)
+        )),
+        (Some(Some(min)), Some(size)) => {
+            // sums of decimals without the digits that their binary forms add
+            let sum = |k: usize| format!("{:.12}", min[k] + size[k]).parse().unwrap_or(min[k] + size[k]);
+            diagnostic.help(format!(
+                "a box ends at `max`, which is `min` plus the size: write `{}`",
+                written(std::array::from_fn(sum))
+            ))
+        }
+        _ => diagnostic.help("a box ends at `max`, which is `min` plus the size"),
+    }
+}
+
+/// A vector of three numbers without units.
+fn plain_vector(value: &Expr) -> Option<[f64; 3]> {
+    let number = |part: &Expr| match &part.kind {
+        ExprKind::Number(number) => Some(*number),
+        ExprKind::Negate(inner) => match inner.kind {
+            ExprKind::Number(number) => Some(-number),
+            _ => None,
+        },
+        _ => None,
+    };
+    match &value.kind {
+        ExprKind::Vector(parts) => parts.iter().map(number).collect::<Option<Vec<f64>>>()?.try_into().ok(),
+        _ => None,
+    }
+}
+
 /// Where a key belongs: to the first of some blocks, all of which are listed, and perhaps to other methods alone.
 fn key_of_blocks(key: &str, (block, all): (&str, &str), methods: &[&str]) -> String {
     // a probe must have a name
@@ -181,6 +222,9 @@ impl<'a> Lowering<'a> {
                     .find(|(block, keys, _)| *block == what && keys.contains(&key.text.as_str()));
                 let is_outer = OUTER.contains(&key.text.as_str());
                 self.report(match (elsewhere, &inner[..]) {
+                    (Some("max"), _) if key.text == "size" && what == "a box" => {
+                        size_of_box(diagnostic, entries, entry)
+                    }
                     (Some(own), _) => diagnostic
                         .help(format!("`{}` is called `{own}` here", key.text))
                         .edit(key.span, &key.text, own, false),

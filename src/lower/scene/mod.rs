@@ -173,6 +173,12 @@ pub struct Fluid {
     pub surface_tension: f64,
     /// Place of its value; `None` if it is the method's.
     pub tension_span: Option<Span>,
+    /// Place of the viscosity in the text or, if that is the method's, of the density by which it is divided.
+    pub viscosity_span: Option<Span>,
+    /// Place of the support radius in the text, if it is stated.
+    pub support_span: Option<Span>,
+    /// Place of the velocity at the start in the text, if it is stated.
+    pub velocity_span: Option<Span>,
     /// Support radius h, m; `None`: as many spacings as is usual for the method.
     pub support_radius: Option<f64>,
     /// Velocity at the start, m/s, as formulas of x, y and z.

@@ -6,6 +6,7 @@ use super::super::lowering::Lowering;
 use super::declaration::declare_keys;
 use super::{Block, Opening, Picture};
 use crate::diagnostic::{Code, Diagnostic};
+use crate::geom::Aabb;
 use crate::quantity::Dimension;
 use crate::syntax::ast::{Comparison, Expr, ExprKind};
 
@@ -34,14 +35,29 @@ declare_keys! {
 }
 
 impl<'a> Lowering<'a> {
-    /// Reads the block `picture` of a scene with these bodies.
-    pub(super) fn picture(&mut self, scene: &Block<'a>, bodies: &[&str]) -> Option<Picture> {
+    /// Reads the block `picture` of a scene with these bodies in this box, if the box is known.
+    pub(super) fn picture(
+        &mut self,
+        scene: &Block<'a>,
+        bodies: &[&str],
+        domain: Option<Aabb>,
+    ) -> Option<Picture> {
         let Some((_, entries, span)) = scene.blocks("picture").next() else {
             return Some(Picture::default());
         };
         let block = self.block(entries, "a picture", span, keys::ALL, &[]);
         let camera = self.camera(&block)?;
         let look_at = self.stated_vector(&block, &keys::LOOK_AT)?;
+        if let (Some(at), Some(domain), Some((_, value))) =
+            (look_at, domain, block.setting(keys::LOOK_AT.name))
+            && !domain.contains(at)
+        {
+            let message = "the place to look at lies outside of the box, where nothing is drawn";
+            self.report(
+                Diagnostic::warning(Code::PICTURE_ASIDE, value.span, message)
+                    .help(format!("the middle of the box is {}", domain.centre())),
+            );
+        }
         let zoom = self.zoom(&block)?;
         let cut = match block.setting(keys::CUT.name) {
             Some((_, value)) => self.opening(value)?,

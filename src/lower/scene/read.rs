@@ -94,6 +94,7 @@ impl<'a> Lowering<'a> {
             &["obstacle", "fluid", "probe"],
         );
         self.units(&block);
+        self.refuse_names(&block);
         let domain = self.domain(&block);
         let fluid = self.fluid_and_method(&block);
         let slip = self.word_key(&block, &scene_keys::WALLS, &SLIPS, Slip::Free);
@@ -103,15 +104,25 @@ impl<'a> Lowering<'a> {
             .blocks("obstacle")
             .filter_map(|(_, entries, span)| self.obstacle(entries, span, "an obstacle", walls))
             .collect();
+        self.refuse_same_obstacles(&obstacles);
         let gravity = self.gravity(&block);
         let run = self.run(&block);
         let truth = self.truth(&block, run.map(|run| run.until));
+        if let (Some(FluidAndMethod { fluid, .. }), Some(truth)) = (&fluid, &truth) {
+            // a known solution may serve as the start
+            let is_known = truth.is_some_and(|truth| truth.velocity == Some(fluid.velocity));
+            if let Some(at) = fluid.velocity_span.filter(|_| !is_known) {
+                self.warn_of_time("velocity", &fluid.velocity, at);
+            }
+        }
         let container_name = container.iter().map(|c| &c.name[..]);
         let bodies: Vec<&str> = container_name.chain(obstacles.iter().map(|o| &o.name[..])).collect();
         // a body that is missing has mistakes that were reported
         let stated = block.blocks("obstacle").count() + block.blocks("container").count();
         let all_bodies = (bodies.len() == stated).then_some(bodies);
-        let picture = all_bodies.as_ref().and_then(|bodies| self.picture(&block, bodies));
+        let picture = all_bodies
+            .as_ref()
+            .and_then(|bodies| self.picture(&block, bodies, domain.map(|(domain, ..)| domain)));
         let probes = match (&domain, &fluid, &run, all_bodies) {
             (
                 Some((domain, ..)),
@@ -162,6 +173,40 @@ impl<'a> Lowering<'a> {
         let message = format!("`tolerance` must be positive and finite, found {number}");
         self.report(Diagnostic::error(Code::OUT_OF_RANGE, value.span, message));
         None
+    }
+
+    /// Reports names behind keys whose blocks have none.
+    fn refuse_names(&mut self, scene: &Block<'_>) {
+        for entry in scene.entries {
+            let Entry::Block { key, label: Some(label), .. } = entry else { continue };
+            if matches!(key.text.as_str(), "fluid" | "probe") {
+                continue;
+            }
+            let message = format!("the block `{}` has no name", key.text);
+            let help = match key.text.as_str() {
+                "obstacle" | "container" => {
+                    format!("leave `{}` out: it is called after its solid", label.text)
+                }
+                _ => format!("leave `{}` out", label.text),
+            };
+            self.report(Diagnostic::error(Code::SCENE_KEY, label.span, message).help(help));
+        }
+    }
+
+    /// Reports obstacles that are one solid at one place.
+    fn refuse_same_obstacles(&mut self, obstacles: &[Obstacle]) {
+        for (i, obstacle) in obstacles.iter().enumerate() {
+            let Some(first) = obstacles[..i].iter().find(|first| first.shape == obstacle.shape) else {
+                continue;
+            };
+            let name = &obstacle.name;
+            let message = format!("the obstacle `{name}` stands twice at the same place");
+            self.report(
+                Diagnostic::error(Code::SCENE_REPEATED, obstacle.span, message)
+                    .label(first.span, "first stated here")
+                    .help(format!("leave one out, or move it: `solid {name}2 = {name}.move([1, 0, 0])`")),
+            );
+        }
     }
 
     fn units(&mut self, block: &Block<'_>) {

@@ -19,6 +19,9 @@ declare_keys! {
     }
 }
 
+/// More frames or checkpoints get a warning.
+const MANY: f64 = 20_000.0;
+
 impl<'a> Lowering<'a> {
     pub(super) fn run(&mut self, block: &Block<'_>) -> Option<Run> {
         let (_, entries, span) = block.blocks("run").next().unwrap_or((None, &[], block.span));
@@ -44,6 +47,17 @@ impl<'a> Lowering<'a> {
                 "a run that is interrupted saves one too; without this key there is one with every frame";
             self.report(Diagnostic::warning(Code::FRAMES, value.span, message).help(help));
         }
+        if let (Some(every), Some((_, value))) =
+            (run.checkpoint_every, block.setting(keys::CHECKPOINT_EVERY.name))
+            && run.until / every > MANY
+        {
+            let count = run.until / every;
+            let [until, every] = times_as_written([run.until, every]);
+            let message = format!("{until} with a checkpoint every {every} are {count:.3e} checkpoints");
+            let help = "each holds all particles and takes the place of an older one: without this key there is one with \
+                        every frame";
+            self.report(Diagnostic::warning(Code::FRAMES, value.span, message).help(help));
+        }
         let stated = block
             .setting(keys::SAVE_EVERY.name)
             .or(block.setting(keys::UNTIL.name))
@@ -53,7 +67,6 @@ impl<'a> Lowering<'a> {
 
     /// Reports frames that would fill a disk, and warns of frames so rare that there are none.
     fn frames_fit(&mut self, run: &Run, at: Span) -> bool {
-        const MANY: f64 = 20_000.0;
         let frames = run.until / run.save_every;
         let [until, every] = times_as_written([run.until, run.save_every]);
         let fewer = format!("write for example `save_every: {}`", seconds_as_written(run.until / 100.0));

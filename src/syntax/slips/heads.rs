@@ -1,6 +1,7 @@
 //! Slips in the heads of items, folds and blocks.
 
 use super::super::foreign;
+use super::super::words::ITEM_WORDS;
 use super::{Slip, bracketed, fits, last_word, parts, unclosed};
 use crate::diagnostic::{Code, Diagnostic, Span};
 
@@ -31,6 +32,40 @@ impl Slip<'_> {
             found if found.starts_with(|c: char| c.is_ascii_digit()) => self.vector_without_commas(),
             _ => None,
         }
+    }
+
+    /// `let q = 3` and `fn f(x) = …` within a scene, of which the place is behind the name.
+    pub(super) fn item_in_braces(&self) -> Option<Diagnostic> {
+        let line = self.on_its_line().trim_start();
+        let is_head = |word: &&str| {
+            let rest = line.strip_prefix(*word).filter(|rest| rest.starts_with(char::is_whitespace));
+            rest.is_some_and(|rest| rest.trim_start().starts_with(char::is_alphabetic))
+        };
+        let word = ITEM_WORDS.into_iter().find(is_head)?;
+        (self.in_braces() && matches!(self.found, "=" | "(")).then(|| {
+            let start = self.at - line.len();
+            let span = Span::new(self.span.source, start, start + word.len());
+            Diagnostic::error(Code::SYNTAX, span, format!("`{word}` within a block"))
+                .help("items stand outside of scenes: move the line above the scene that uses it")
+        })
+    }
+
+    /// A text where none may stand, which is closed on its line.
+    pub(super) fn text_in_a_wrong_place(&self) -> Diagnostic {
+        let text = self.after().split('"').next().unwrap_or_default();
+        let head = last_word(self.before());
+        let behind = self.after().get(text.len() + 1..).unwrap_or_default().trim_start();
+        let span = Span::new(self.span.source, self.at, self.at + text.len() + 2);
+        let diagnostic =
+            Diagnostic::error(Code::SYNTAX, span, format!("unexpected text `\"{}\"`", text.escape_debug()));
+        if ITEM_WORDS.contains(&head) || self.in_braces() && behind.starts_with('{') {
+            let name: String = text.chars().map(|c| if c.is_alphanumeric() { c } else { '_' }).collect();
+            let name = name.trim_matches('_');
+            let is_name = name.starts_with(char::is_alphabetic);
+            let name = if is_name { name } else { "name" };
+            return diagnostic.help(format!("a name has no quotes, as in `{head} {name}`"));
+        }
+        diagnostic.help("only a param has a description: write it as a comment, behind `#`")
     }
 
     /// `|x|`

@@ -125,6 +125,40 @@ impl Slip<'_> {
         Some(diagnostic.help(format!("write `{written}`{or}")))
     }
 
+    /// `velocity: [0, 0, -1] m/s` in a block, where the grammar takes the unit for the next key.
+    pub(super) fn unit_of_a_vector(&self) -> Option<Diagnostic> {
+        // the grammar may have taken the next key for the name of a block
+        let before = match self.found {
+            ":" => self.before().strip_suffix(last_word(self.before()))?.trim_end(),
+            _ => self.before(),
+        };
+        let word = last_word(before);
+        let vector = before.strip_suffix(word)?.trim_end();
+        if word.is_empty() || !self.in_braces() || !vector.ends_with(']') {
+            return None;
+        }
+        let start = self.start + before.len() - word.len();
+        let ends = |c: char| c.is_whitespace() || matches!(c, ',' | '}' | ')' | ']' | ';' | '#' | ':');
+        let unit = self.text[start..].split(ends).next().unwrap_or_default();
+        parse_unit(unit)?;
+        // a key may have the name of a unit
+        let behind = self.text[start + unit.len()..].trim_start();
+        if behind.starts_with([':', '{']) {
+            return None;
+        }
+        let (_, inner) = vector[..vector.len() - 1].rsplit_once('[')?;
+        let parts: Vec<&str> = inner.split(',').map(str::trim).collect();
+        let are_numbers = parts.iter().all(|part| part.parse::<f64>().is_ok());
+        let help = if are_numbers {
+            let parts: Vec<String> = parts.iter().map(|part| format!("{part} {unit}")).collect();
+            format!("each component has its own, as in `[{}]`", parts.join(", "))
+        } else {
+            "each component has its own, as in `[0, 0, -1 m/s]`: leave this one out".to_string()
+        };
+        let span = Span::new(self.span.source, start, start + unit.len());
+        Some(Diagnostic::error(Code::SYNTAX, span, "a unit stands behind a number").help(help))
+    }
+
     /// `viscosity: 1 cP }`, `1000 kg m^-3`: the text behind the number is no unit, or continues behind one,
     /// so the grammar takes it for the next key.
     pub(super) fn unit_taken_for_a_key(&self) -> Option<Diagnostic> {
