@@ -108,6 +108,16 @@ pub(super) trait PairPass<const IN: usize, const SUMS: usize, const OUT: usize>:
 
     /// Results of particle `i`.
     fn finish(&self, i: usize, sums: [f64; SUMS]) -> [f64; OUT];
+
+    /// The pass as it is for these particles, where it does not do the same for all.
+    fn for_block(self, _: std::ops::Range<usize>) -> Self {
+        self
+    }
+
+    /// How many of the `IN` numbers it reads, from the first on.
+    fn reads(&self) -> usize {
+        IN
+    }
 }
 
 /// Number of blocks in one task: small enough to balance the load, large enough to make its overhead
@@ -198,7 +208,8 @@ impl Cloud<'_> {
                             &*near
                         }
                     };
-                    self.gather(&fields, near, copies);
+                    let pass = &pass.for_block(block.particles());
+                    self.gather(&fields, pass.reads(), near, copies);
                     add_up::<T, P, IN, SUMS, OUT>(self.level, pass, block, near, copies, sums);
                     finish::<P, IN, SUMS, OUT>(pass, block, sums, task.first, &mut task.out);
                 }
@@ -245,12 +256,14 @@ impl Cloud<'_> {
         at_level!(self.level, simd => self.collect_near_registers(simd, block, near));
     }
 
-    /// Copies the fields that a pass reads, of the particles around a block.
-    fn gather<T: Kept>(&self, fields: &[&[f64]], near: &OfBlock<T>, copies: &mut Vec<Vec<T>>) {
+    /// Copies the first `reads` fields, which a pass reads, of the particles around a block.
+    fn gather<T: Kept>(&self, fields: &[&[f64]], reads: usize, near: &OfBlock<T>, copies: &mut Vec<Vec<T>>) {
         copies.resize_with(fields.len().max(copies.len()), Vec::new);
-        for (values, source) in copies.iter_mut().zip(fields) {
+        for (k, (values, source)) in copies.iter_mut().zip(fields).enumerate() {
             make_room(values, near.count);
-            at_level!(self.level, simd => copy_ranges(simd, source, 0.0, &near.ranges, values));
+            if k < reads {
+                at_level!(self.level, simd => copy_ranges(simd, source, 0.0, &near.ranges, values));
+            }
         }
     }
 
