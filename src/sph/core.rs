@@ -211,6 +211,17 @@ impl Core {
         near.then(|| self.boundary.coverage(&plain, self.particles.position.get(i)))?
     }
 
+    /// The part of that by the walls of the box.
+    pub fn coverage_by_box(&self, i: usize) -> Coverage {
+        let plain = Wall { layer: None, ..self.wall };
+        self.boundary.coverage_by_box(&plain, self.particles.position.get(i))
+    }
+
+    /// The walls of the box near a particle: their normals into it, and their distances, m.
+    pub fn box_faces(&self, i: usize) -> impl Iterator<Item = (DVec3, f64)> {
+        self.boundary.box_planes(&self.wall, self.particles.position.get(i))
+    }
+
     /// How walls enter the sums of the method.
     pub fn wall(&self) -> &Wall {
         &self.wall

@@ -15,7 +15,7 @@
 //! (M + ρQ)·(α, β) = Σ (f, (x − c) × f)        M = Σ w J Jᵀ,  Q = Σ λ g gᵀ,  g = (m, (x − c) × m)
 //! ```
 //!
-//! with a ρ so large that what Q holds is left alone.
+//! with a ρ so large that what Q holds is left alone. In edges each wall counts with the λ of all of them.
 //!
 //! Two particles belong to one body if their cells in a grid with the support radius as spacing touch. So
 //! bodies that approach each other count as one slightly too early.
@@ -25,7 +25,7 @@ use std::collections::HashMap;
 use glam::{DMat3, DVec3};
 use nalgebra::{ArrayStorage, Cholesky, Matrix3, Matrix6, Vector3, Vector6};
 
-use super::wetting::{Plane, Wetting};
+use super::images::{Mirrors, Plane};
 use crate::sph::{core::Core, particles::Vectors};
 
 /// A body that is as flat as a line, by the determinant of its moment of inertia over the cube of its trace,
@@ -56,13 +56,13 @@ struct Body {
 
 /// Removes the resultant and the torque from the forces on bodies, as far as no wall holds them. `force` holds the
 /// force of each particle over its mass, `weight` how far it belongs to the surface.
-pub(super) fn balance(core: &Core, wetting: &Wetting, force: &mut Vectors, weight: &[f64]) {
+pub(super) fn balance(core: &Core, mirrors: &Mirrors, force: &mut Vectors, weight: &[f64]) {
     let (of, count) = bodies(core, core.parameters.support_radius);
     let mut bodies = vec![Body::NONE; count];
     let position = &core.particles.position;
     for (i, &k) in of.iter().enumerate() {
         let body = &mut bodies[k];
-        body.touches_wall = body.touches_wall || wetting.plane(i).is_some();
+        body.touches_wall = body.touches_wall || mirrors.near(i).is_some();
         body.weight += weight[i];
         body.centre += weight[i] * position.get(i);
         body.force += force.get(i);
@@ -77,10 +77,12 @@ pub(super) fn balance(core: &Core, wetting: &Wetting, force: &mut Vectors, weigh
         body.torque += away.cross(force.get(i));
         let square = DMat3::from_cols(away * away.x, away * away.y, away * away.z);
         body.inertia += weight[i] * (DMat3::from_diagonal(DVec3::splat(away.length_squared())) - square);
-        if let Some(Plane { normal, filled, .. }) = wetting.plane(i) {
-            let turn = away.cross(*normal);
-            let along = Vector6::new(normal.x, normal.y, normal.z, turn.x, turn.y, turn.z);
-            body.held += *filled * along * along.transpose();
+        if let Some(near) = mirrors.near(i) {
+            for Plane { normal, .. } in &near.each {
+                let turn = away.cross(*normal);
+                let along = Vector6::new(normal.x, normal.y, normal.z, turn.x, turn.y, turn.z);
+                body.held += near.filled * along * along.transpose();
+            }
         }
     }
     for body in &mut bodies {

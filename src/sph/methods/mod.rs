@@ -25,6 +25,7 @@ mod crowding;
 mod declaration;
 mod dfsph;
 mod free_surface;
+mod images;
 mod near_walls;
 mod negative_pressure;
 mod numerics;

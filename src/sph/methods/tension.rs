@@ -2,7 +2,7 @@
 //! without an outer phase.
 //!
 //! ```text
-//! n_i = Σ V ∇W + ∇λ          into the fluid, of the length A(δ)/h at the depth δh below a flat surface
+//! n_i = Σ V ∇W               into the fluid, of the length A(δ)/h at the depth δh below a flat surface
 //! κ_i = −∇·(n/|n|)           Σ over neighbours with a normal, divided by the sum's own tangential moment
 //! a_i = (2σ/ρ₀)·κ·n_i/L
 //! ```
@@ -19,13 +19,17 @@
 //! Σ V c f·½(r² − (r·n̂)²). This is exact where the normals turn evenly. (Sirotkin & Yoh 2012 renormalise the full
 //! matrix.)
 //!
-//! A surface meets a wall at a right angle: for n̂ and κ the fluid has an image in the wall ([`super::wetting`]).
-//! In n, which is what a pressure acts on as well, it is the wet part of the wall that counts. (With the whole wall, which
-//! goes on beside a drop as well as below it, drops spread until they were a layer thin, and fell apart.) Beside a wall
-//! the tension acts along it: what it has across it, by the noise of n, would press particles into the wall.
+//! A surface meets a wall at a right angle: for n, n̂ and κ the fluid has images in the walls ([`super::images`]), and
+//! what its edge takes of the walls follows from them, too ([`super::wetting`]). (With the whole wall, which goes on
+//! beside a drop as well as below it, drops spread until they were a layer thin, and fell apart. Curvature from the
+//! fluid alone, whose sums are one-sided near a wall, made the edges of a still hemisphere leap within a few steps.)
+//! Where walls are no mirrors, in the edges of an obstacle, n is Σ V ∇W + ∇λ with the wet part of the walls. Beside
+//! them the tension acts along the wall: what it has across it, by the noise of n, would press particles into the wall.
 //!
 //! The forces on a body of fluid that touches no wall have neither a resultant nor a torque, and those on one that
 //! does move it along none of its walls ([`bodies_of_fluid`]).
+
+use std::ops::Range;
 
 use fearless_simd::{Simd, SimdFloat};
 use glam::DVec3;
@@ -33,7 +37,8 @@ use glam::DVec3;
 use super::{
     bodies_of_fluid,
     crowding::Crowding,
-    wetting::{Image, Wetting, from_image},
+    images::{self, COLUMNS, Image, Mirrors, Plane},
+    wetting,
 };
 use crate::sph::{
     core::Core,
@@ -57,10 +62,10 @@ const LEAST_WHOLE: f64 = 0.5;
 const LEAST_MOMENT: f64 = 0.05;
 
 /// By how much of itself, over hκ, the curvature of a layer of particles counts as too large, where pressures act in
-/// pairs. The layer lies nearer to the middle of a drop than the surface does. By quadrature of the sums over balls with
-/// h/R of 0.15 to 0.39 its curvature is 0.149 to 0.171 too large. With that the pressure of a drop at rest is within 1 %,
-/// but its swings are 2 to 6 % slow (8000 to 1500 particles), because their work is that of the layer. With 0.11 the
-/// pressure is 4 to 3 % too high, and periods are within 1 % from 2000 particles on.
+/// pairs. The layer lies nearer to the middle of a drop than the surface does. By quadrature of the sums over balls
+/// with h/R of 0.15 to 0.39 its curvature is 0.149 to 0.171 too large. With that the pressure of a drop at rest is
+/// within 1 %, but its swings are 2 to 6 % slow (8000 to 1500 particles), because their work is that of the layer. With
+/// 0.11 the pressure is 4 to 3 % too high, and periods are within 1 % from 2000 particles on.
 const DEPTH: f64 = 0.11;
 
 /// What [`NORMAL`] leaves of ∫|n| across a flat surface.
@@ -79,19 +84,27 @@ pub(super) struct Tension {
     /// Normals n, 1/m.
     normal: Vectors,
     force: Vectors,
-    wetting: Wetting,
+    mirrors: Mirrors,
 }
 
 impl Tension {
     /// Finds which walls are wet, once the particles are sorted, if the fluid is under tension.
     pub fn find_wet_walls(&mut self, core: &mut Core) {
         if core.parameters.surface_tension != 0.0 {
-            self.wetting.find(core);
+            self.mirrors.find(core);
+            wetting::find(core, &self.mirrors);
         }
     }
 
     /// Adds the accelerations by surface tension, if the fluid has any.
-    pub fn act(&mut self, core: &mut Core) {
+    pub fn act(&self, core: &mut Core) {
+        if let Some(force) = self.force(&core.parameters) {
+            add_scaled(&mut core.acceleration, force, 1.0);
+        }
+    }
+
+    /// Finds the accelerations by surface tension, if the fluid has any.
+    pub fn find(&mut self, core: &Core) {
         let parameters = &core.parameters;
         if parameters.surface_tension == 0.0 {
             return;
@@ -103,50 +116,90 @@ impl Tension {
         self.weight.resize(n, 0.0);
         let crowding = Crowding::of(parameters);
 
-        let images = self.wetting.any().then(|| self.wetting.planes());
+        let images = self.mirrors.any().then(|| self.mirrors.columns());
 
-        let pass = Normals { crowding, core, wetting: &self.wetting };
+        let pass = Normals { crowding, core };
         let (Vectors { x, y, z }, Vectors { x: dx, y: dy, z: dz }) = (&mut self.normal, &mut self.direction);
         let out = [&mut x[..], y, z, dx, dy, dz, &mut self.weight];
         match images {
-            Some(planes) => core.sum(&WithImages(pass), planes, out),
+            Some(planes) => core.sum(&WithImages::new(pass, &self.mirrors), planes, out),
             None => core.sum(&pass, [], out),
         }
 
         let layer = Layer::of(parameters);
-        let pass = Curvature { crowding, layer, parameters, normal: &self.normal, weight: &self.weight };
+        let (normal, weight) = (&self.normal, &self.weight);
+        let pass = Curvature { crowding, layer, parameters, normal, weight };
         let Vectors { x: dx, y: dy, z: dz } = &self.direction;
         let Vectors { x, y, z } = &mut self.force;
         let (direction, out) = ([&dx[..], dy, dz, &self.weight], [&mut x[..], y, z]);
         match images {
-            Some([x, y, z, distance]) => {
+            Some([ax, ay, az, ad, bx, by, bz, bd, cx, cy, cz, cd]) => {
                 let [dx, dy, dz, weight] = direction;
-                core.sum(&WithImages(pass), [dx, dy, dz, weight, x, y, z, distance], out);
+                let columns = [dx, dy, dz, weight, ax, ay, az, ad, bx, by, bz, bd, cx, cy, cz, cd];
+                core.sum(&WithImages::new(pass, &self.mirrors), columns, out);
             }
             None => core.sum(&pass, direction, out),
         }
 
-        bodies_of_fluid::balance(core, &self.wetting, &mut self.force, &self.weight);
-        add_scaled(&mut core.acceleration, &self.force, 1.0);
+        bodies_of_fluid::balance(core, &self.mirrors, &mut self.force, &self.weight);
+    }
+
+    /// The accelerations that the last [`Self::find`] found, m/s²; `None` for a fluid without tension.
+    pub fn force(&self, parameters: &Parameters) -> Option<&Vectors> {
+        (parameters.surface_tension != 0.0).then_some(&self.force)
+    }
+
+    /// The walls as mirrors; `None` if none is near any particle.
+    pub fn mirrors(&self) -> Option<&Mirrors> {
+        self.mirrors.any().then_some(&self.mirrors)
+    }
+
+    /// Whether one of these particles belongs to the surface.
+    pub fn any_at_surface(&self, particles: Range<usize>) -> bool {
+        self.weight[particles].iter().any(|weight| *weight > 0.0)
+    }
+
+    /// n of a particle near walls that mirror the fluid, 1/m, with its weight; `None` for others, and in the depth.
+    pub fn at_mirrors(&self, i: usize) -> Option<(DVec3, f64)> {
+        let weight = self.weight[i];
+        let is_at_mirrors = weight > 0.0 && self.mirrors.near(i).is_some_and(|near| near.are_mirrors);
+        is_at_mirrors.then(|| (self.normal.get(i), weight))
     }
 
     pub fn bytes(&self) -> usize {
         [&self.direction, &self.normal, &self.force].map(Vectors::bytes).iter().sum::<usize>()
             + 8 * self.weight.capacity()
-            + self.wetting.bytes()
+            + self.mirrors.bytes()
     }
 }
 
-/// A pass that counts the image of each neighbour, too.
+/// Columns of directions with their weights, and of planes.
+const DIRECTED: usize = 4 + COLUMNS;
+
+/// A pass that counts the images of each neighbour, too.
 #[derive(Clone, Copy)]
-struct WithImages<P>(P);
+struct WithImages<'a, P> {
+    pass: P,
+    mirrors: &'a Mirrors,
+    /// Number of planes.
+    count: usize,
+}
+
+impl<'a, P> WithImages<'a, P> {
+    fn new(pass: P, mirrors: &'a Mirrors) -> Self {
+        Self { pass, mirrors, count: 0 }
+    }
+
+    fn in_block(self, particles: Range<usize>) -> Self {
+        Self { count: self.mirrors.most(particles), ..self }
+    }
+}
 
 /// Finds n, n̂ and its weight.
 #[derive(Clone, Copy)]
 struct Normals<'a> {
     crowding: Crowding,
     core: &'a Core,
-    wetting: &'a Wetting,
 }
 
 impl PairPass<0, 3, 7> for Normals<'_> {
@@ -177,37 +230,46 @@ impl Normals<'_> {
     }
 }
 
-impl PairPass<4, 6, 7> for WithImages<Normals<'_>> {
+impl PairPass<COLUMNS, 6, 7> for WithImages<'_, Normals<'_>> {
     #[inline(always)]
     fn add<S: Simd, V: SimdFloat<S, Element: Real>>(
         &self,
         d: [V; 3],
         r2: V,
-        plane: &[V; 4],
-        _: [V; 4],
+        planes: &[V; COLUMNS],
+        _: [V; COLUMNS],
         [fx, fy, fz, ix, iy, iz]: &mut [V; 6],
     ) {
-        let crowding = self.0.crowding;
-        let (mut fluid, mut image) = ([*fx, *fy, *fz], [*ix, *iy, *iz]);
+        let crowding = self.pass.crowding;
+        let (mut fluid, mut images) = ([*fx, *fy, *fz], [*ix, *iy, *iz]);
         crowding.add(d, r2, &mut fluid);
-        let mirrored = from_image(plane, d, r2);
-        crowding.add(mirrored.d, mirrored.r2, &mut image);
-        ([*fx, *fy, *fz], [*ix, *iy, *iz]) = (fluid, image);
+        images::for_each(self.count, planes, Image { d, r2, direction: d }, |Image { d, r2, .. }| {
+            crowding.add(d, r2, &mut images);
+        });
+        ([*fx, *fy, *fz], [*ix, *iy, *iz]) = (fluid, images);
     }
 
     fn finish(&self, i: usize, [fx, fy, fz, ix, iy, iz]: [f64; 6]) -> [f64; 7] {
-        let Normals { crowding, core, wetting } = self.0;
+        let Normals { crowding, core } = self.pass;
         let fluid = crowding.total([fx, fy, fz]);
-        match (core.coverage::<()>(i), wetting.plane(i)) {
-            (Some(wall), Some(plane)) => {
-                let normal = fluid + wall.gradient;
-                // a layer at rest lies half a spacing from its wall, and the next one is free
-                let free = (plane.distance / core.parameters.spacing() - 0.5).clamp(0.0, 1.0);
-                let across = (1.0 - free) * normal.dot(plane.normal) * plane.normal;
-                self.0.results(normal - across, fluid + crowding.total([ix, iy, iz]))
-            }
-            (None, _) | (_, None) => self.0.results(fluid, fluid),
-        }
+        let both = fluid + crowding.total([ix, iy, iz]);
+        let Some(oblique) = self.mirrors.near(i).filter(|near| !near.are_mirrors) else {
+            return self.pass.results(both, both);
+        };
+        // images do not fill the kernel, and the wall does
+        let normal = fluid + core.coverage::<()>(i).map_or(DVec3::ZERO, |wall| wall.gradient);
+        let Plane { normal: across, distance } = oblique.each[0];
+        // a layer at rest lies half a spacing from its wall, and the next one is free
+        let held = (1.5 - distance / core.parameters.spacing()).clamp(0.0, 1.0);
+        self.pass.results(normal - held * normal.dot(across) * across, both)
+    }
+
+    fn for_block(self, particles: Range<usize>) -> Self {
+        self.in_block(particles)
+    }
+
+    fn reads(&self) -> usize {
+        images::columns_of(self.count)
     }
 }
 
@@ -305,26 +367,35 @@ impl Curvature<'_> {
     }
 }
 
-impl PairPass<8, 2, 3> for WithImages<Curvature<'_>> {
+impl PairPass<DIRECTED, 2, 3> for WithImages<'_, Curvature<'_>> {
     #[inline(always)]
     fn add<S: Simd, V: SimdFloat<S, Element: Real>>(
         &self,
         d: [V; 3],
         r2: V,
-        &[dx, dy, dz, weight, x, y, z, distance]: &[V; 8],
-        [ox, oy, oz, other_weight, ..]: [V; 8],
+        own: &[V; DIRECTED],
+        [x, y, z, weight, ..]: [V; DIRECTED],
         sums: &mut [V; 2],
     ) {
-        let own = [dx, dy, dz, weight];
-        self.0.bend(d, r2, &own, [ox, oy, oz, other_weight], sums);
-        let Image { d, r2, is_mirrored } = from_image(&[x, y, z, distance], d, r2);
-        let across = z.mul_add(oz, y.mul_add(oy, x * ox)) * is_mirrored;
-        let twice = across + across;
-        let image = [ox - twice * x, oy - twice * y, oz - twice * z, other_weight];
-        self.0.bend(d, r2, &own, image, sums);
+        let (own, planes) = (&[own[0], own[1], own[2], own[3]], &own[4..]);
+        self.pass.bend(d, r2, own, [x, y, z, weight], sums);
+        let neighbour = Image { d, r2, direction: [x, y, z] };
+        images::for_each(self.count, planes, neighbour, |Image { d, r2, direction: [x, y, z] }| {
+            self.pass.bend(d, r2, own, [x, y, z, weight], sums);
+        });
     }
 
     fn finish(&self, i: usize, sums: [f64; 2]) -> [f64; 3] {
-        self.0.finish(i, sums)
+        self.pass.finish(i, sums)
+    }
+
+    fn for_block(self, particles: Range<usize>) -> Self {
+        // in the depth curvature does nothing
+        let is_deep = self.pass.weight[particles.clone()].iter().all(|weight| *weight == 0.0);
+        if is_deep { Self { count: 0, ..self } } else { self.in_block(particles) }
+    }
+
+    fn reads(&self) -> usize {
+        4 + images::columns_of(self.count)
     }
 }

@@ -31,6 +31,19 @@ impl Boundary {
         })
     }
 
+    /// The walls of the box that are nearer to a place than the support radius and not behind a moving obstacle: their
+    /// normals into the box, and distances, m.
+    pub fn box_planes(&self, wall: &Wall, p: DVec3) -> impl Iterator<Item = (DVec3, f64)> {
+        self.box_faces(p)
+            .filter(move |(_, face)| face.distance < wall.h && self.bare(wall, p, face) > 0.5)
+            .map(|(_, face)| (face.normal, face.distance))
+    }
+
+    /// What the walls of the box take of the kernel of a particle, without that of obstacles.
+    pub fn coverage_by_box(&self, wall: &Wall, p: DVec3) -> Coverage {
+        self.of_box(wall, p)
+    }
+
     /// How much of a wall of the box before a particle counts beside moving obstacles, 0 to 1.
     ///
     /// A vessel that moves may have its floor in the wall or before it. What is behind the wall is then the vessel's

@@ -2,15 +2,16 @@
 //! are found by iteration.
 //!
 //! ```text
-//! v ← v + dt·(½·g + viscosity)
+//! v ← v + dt·(½·(g + tension) + viscosity)
 //! v ← v + dt·a(s)          s ≥ 0 so that dρ/dt ≤ −D/τ, or ≤ (ρ₀ − ρ)/τ where ρ < ρ₀; see `full` if there is no surface
 //! D ← D + dt·(the part of dρ/dt that the solver left)
-//! v ← v + ½·dt·(g + a(s̄))
+//! v ← v + ½·dt·(g + tension + a(s̄))
 //! x ← x + dt·v + b(s′)     s′ ≥ 0 so that ρ ≤ ρ₀ at the new place
 //! v ← v + the part of b(s′)/dt that undoes this motion
 //! ```
 //!
-//! with the lower of the last pressure and its mean as s̄ ([`Ahead`]): the fluid follows its curved paths to second order.
+//! with the lower of the last pressure and its mean as s̄ ([`Ahead`]): the fluid follows its curved paths to second
+//! order.
 //!
 //! Here s = p/ρ². In the paper the second solver corrects the density by changing velocities, so each small
 //! error of a density becomes a speed: a fluid at rest simmers, and so does its pressure. Here the second
@@ -396,9 +397,11 @@ impl DivergenceFree {
         // force advances them from the middle of the last step. Steps differ in length as the fluid slows
         // down and falls again: if the force acted for the whole of each step, a ball of water that swings
         // through the middle of a trap would lose a tenth of its energy in three periods. (After uniform
-        // gravity velocities are those of the end of a step, whatever its length.)
-        self.ahead.pull(core, (0.5 * (self.last_dt + dt) / dt).min(MOST_CARRIED));
-        self.tension.act(core);
+        // gravity velocities are those of the end of a step, whatever its length.) Surface tension is such a force,
+        // too.
+        self.tension.find(core);
+        let tension = self.tension.force(&core.parameters);
+        self.ahead.pull(core, tension, (0.5 * (self.last_dt + dt) / dt).min(MOST_CARRIED));
     }
 
     /// Changes velocities by pressure so that nothing is compressed beyond the rest density.

@@ -1,5 +1,6 @@
 //! The weakly compressible method: its numbers, keys and limits. The scheme is in [`scheme`].
 
+mod at_edges;
 mod linear;
 mod numbers;
 mod passes;

@@ -36,10 +36,13 @@ impl Numbers {
 }
 
 /// Whether the sums include crowding. They do where particles are kept evenly distributed (with differences
-/// of pressure, and with shifting), and where the growth of the density at rest depends on the place, as
-/// gravity does.
+/// of pressure, and with shifting), where the growth of the density at rest depends on the place, as gravity does, and
+/// where the surface tension balances an even pressure.
 pub(super) fn sums_crowding(numbers: &Numbers, core: &Core) -> bool {
-    numbers.shifting > 0.0 || numbers.gradients == Gradients::Differences || core.gravity_field.is_some()
+    numbers.shifting > 0.0
+        || numbers.gradients == Gradients::Differences
+        || core.gravity_field.is_some()
+        || core.parameters.surface_tension != 0.0
 }
 
 /// ρ₀/c²·g: how the density of a fluid at rest grows along gravity, kg/m⁴.

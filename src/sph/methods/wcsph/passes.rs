@@ -13,6 +13,7 @@ use super::super::{
     viscosity::SpinSums,
 };
 use super::Gradients;
+use super::at_edges::{Edge, Edges};
 use super::linear::{Held, Linear};
 use super::numbers::{Numbers, at_rest};
 use crate::sph::{
@@ -92,6 +93,8 @@ pub(super) struct Rates<'a> {
     pub mean_filled: f64,
     /// Viscous forces that replace those along lines, with the walls near particles.
     pub spin: Option<(SpinSums<'a>, &'a NearWalls<Coverage<WallDrag>>)>,
+    /// The edges on walls of a fluid under tension.
+    pub edges: Option<Edges<'a>>,
     /// Receives the forces of walls, if they are wanted.
     reaction: Option<Reaction<'a>>,
 }
@@ -135,6 +138,7 @@ impl<'a> Rates<'a> {
             lattice: Wendland::lattice_sum(parameters.support_radius / parameters.spacing()),
             mean_filled: 1.0,
             spin: None,
+            edges: None,
             reaction: Reaction::of(core, dt),
         }
     }
@@ -283,6 +287,11 @@ impl<const LAMINAR: bool, const ARTIFICIAL: bool, const EVEN: bool> Pairs<'_, LA
             let balanced =
                 if rates.differences { 1.0 } else { depth.max(held(filled) * rates.calm(i, velocity)) };
             push = push.lerp(wall.completion() * push, balanced);
+            if let Some(Edge { normal, weight, compression }) = rates.edges.and_then(|edges| edges.at(i)) {
+                let even = -2.0 * (1.0 - smooth) * rates.pressure[i] * normal;
+                push = push.lerp(wall.completion() * pairs + even, weight);
+                wall_rate += weight * (compression - wall_rate);
+            }
         }
         push *= mean;
         let mut compression = mean * (compression_by_pairs + wall_rate);

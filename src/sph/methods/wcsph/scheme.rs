@@ -57,7 +57,8 @@
 //! motion conserves energy. Particles of a surface at rest have the factor, or walls would not bear their
 //! share of its weight: without it the pressure of water eight layers deep is too high by a tenth of a
 //! layer, everywhere. Particles of a moving surface do not have it: a film that runs along a floor would
-//! gain energy by it, 0.5 % of that of a tank.
+//! gain energy by it, 0.5 % of that of a tank. At the edge of a fluid under tension the walls mirror the fluid itself
+//! ([`Edges`]).
 //!
 //! Along walls on which it slips the flow is mirrored: the part of the kernel inside them adds as much to the
 //! viscosity as the rest.
@@ -77,6 +78,7 @@ use super::super::{
     tension::Tension,
     viscosity::SpinViscosity,
 };
+use super::at_edges::Edges;
 use super::numbers::{Numbers, at_rest, sums_crowding, tait};
 use super::passes::{Differences, Missing, Pairs, Rates, Shifted, closes_gaps};
 use super::{EXPONENT, Gradients, Wcsph};
@@ -120,6 +122,8 @@ pub struct Weakly {
     /// Working memory: the Q and the drift that a sum finds.
     found: [Vec<f64>; 2],
     tension: Tension,
+    /// Working memory of [`Edges`].
+    edge_compression: Vec<f64>,
     viscosity: SpinViscosity,
     /// The walls near particles, found for them.
     walls: NearWalls<Coverage<WallDrag>>,
@@ -196,6 +200,7 @@ impl Scheme for Weakly {
             + self.crowding.bytes()
             + self.common.as_ref().map_or(0, Common::bytes)
             + self.tension.bytes()
+            + 8 * self.edge_compression.capacity()
             + self.roughness.bytes()
             + self.viscosity.bytes()
             + self.walls.bytes()
@@ -239,6 +244,7 @@ impl Weakly {
             roughness: Roughness::of(&core.particles.velocity, numbers.gradients == Gradients::Pairs),
             found: [vec![0.0; n], vec![0.0; n]],
             tension: Tension::default(),
+            edge_compression: Vec::new(),
             viscosity: SpinViscosity::default(),
             walls: NearWalls::default(),
         };
@@ -323,6 +329,7 @@ impl Weakly {
         if closes_gaps(numbers) && core.steps.is_multiple_of(SURFACE_STEPS) {
             core.sum(&Missing::new(core), [], [&mut self.missing]);
         }
+        self.tension.find(core);
         let mut rates = Rates::new(core, numbers, &predicted, &pressure, &self.excess, &self.missing, dt);
         rates.mean_filled = self.mean_filled;
         if core.wall().viscous_forces == ViscousForces::WithSpin {
@@ -330,6 +337,7 @@ impl Weakly {
         }
         let walls = &self.walls;
         let sums = self.viscosity.find(core, &predicted, |i| walls.near(i).map(|wall| wall.friction));
+        rates.edges = Edges::find(core, &self.tension, &predicted, &mut self.edge_compression);
         rates.spin = sums.map(|sums| (sums, walls));
         if numbers.gradients == Gradients::Differences {
             match (rates.laminar > 0.0, rates.artificial > 0.0) {
