@@ -57,6 +57,7 @@ pub mod view;
 
 mod heights;
 mod lettering;
+mod random;
 mod table;
 mod triangles;
 

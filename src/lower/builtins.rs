@@ -4,6 +4,7 @@ use super::lowering::Lowering;
 use super::value::Value;
 use crate::diagnostic::{Code, Diagnostic, Span};
 use crate::ir::{self, Binary, BinaryFunction, Node, Unary};
+use crate::random;
 use crate::syntax::ast::{Argument, Expr, ExprKind, Name};
 
 /// A function of the language.
@@ -319,9 +320,9 @@ impl Lowering<'_> {
             let Some(number) = self.as_constant(node, span, "an argument of `random`") else {
                 return Value::Failed;
             };
-            state = scrambled(state ^ (number + 0.0).to_bits());
+            state = random::scrambled(state ^ (number + 0.0).to_bits());
         }
-        Value::Number(self.constant((state >> 11) as f64 / (1_u64 << 53) as f64))
+        Value::Number(self.constant(random::from_bits(state)))
     }
 
     /// How many members a list has.
@@ -403,12 +404,4 @@ fn example(name: &str) -> Option<&'static str> {
         "random" => "random(1, i)",
         _ => return None,
     })
-}
-
-/// One step of the generator SplitMix64 (Steele, Lea and Flood 2014): every bit of the result depends on all bits.
-fn scrambled(seed: u64) -> u64 {
-    let mut z = seed.wrapping_add(0x9e37_79b9_7f4a_7c15);
-    z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-    z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-    z ^ (z >> 31)
 }

@@ -20,6 +20,7 @@ use super::Watch;
 use crate::field::Field;
 use crate::geom::Aabb;
 use crate::interval::Interval;
+use crate::random;
 
 /// The volume and the area of a solid, found along lines.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -111,16 +112,9 @@ pub fn by_lines(field: &dyn Field, bounds: &Aabb, watch: &dyn Watch) -> Option<B
 
 /// The place of a line on its face, from (0, 0) to (1, 1).
 fn place(set: usize, axis: usize, line: usize) -> DVec2 {
-    let shift = DVec2::new(at_random(6 * set + 2 * axis), at_random(6 * set + 2 * axis + 1));
+    let [x, y] = [0, 1].map(|side| random::nth((6 * set + 2 * axis + side) as u64));
+    let shift = DVec2::new(x, y);
     (shift + (line as f64) * STEP).fract()
-}
-
-/// A number from 0 to 1, always the same for the same one (SplitMix64, Steele et al. 2014).
-fn at_random(number: usize) -> f64 {
-    let mut z = (number as u64 + 1).wrapping_mul(0x9e37_79b9_7f4a_7c15);
-    z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-    z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-    ((z ^ (z >> 31)) >> 11) as f64 / (1_u64 << 53) as f64
 }
 
 /// What lines along one axis have met.
