@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 
 use super::c_blocks::Blocks;
 use super::c_folds::Folds;
-use super::c_header::{columns_name, function_name, guard, in_c};
+use super::c_linkage::{columns_name, function_name, guard, in_c};
 use super::c_room::Room;
 use super::language::{C, Function};
 use super::operations::{Names, Operation, WEIGHTED_FIELDS};
@@ -39,7 +39,7 @@ pub(super) enum Flavour {
 
 impl Flavour {
     /// What stands before the functions that others call.
-    pub fn linkage(self) -> &'static str {
+    fn linkage(self) -> &'static str {
         match self {
             Self::Unit => "",
             Self::Header => "static inline ",
@@ -162,7 +162,7 @@ impl CFile<'_> {
         lines
     }
 
-    pub fn macros(&self) -> Vec<String> {
+    fn macros(&self) -> Vec<String> {
         let mut lines: Vec<String> = Vec::new();
         if self.flavour != Flavour::Unit {
             let guard = guard(self.file, "SOURCE_H");
@@ -228,7 +228,7 @@ impl CFile<'_> {
     }
 
     /// Arguments between the point and the results.
-    pub fn extra_arguments(&self) -> String {
+    fn extra_arguments(&self) -> String {
         let time = if self.file.moves { ", double t" } else { "" };
         let params = if self.file.params.is_empty() {
             String::new()
@@ -254,7 +254,7 @@ impl CFile<'_> {
         format!("{number} {name}({number} x, {number} y, {number} z{}{results})", self.extra_arguments())
     }
 
-    pub fn columns_signature(&self, question: Question, precision: Precision) -> String {
+    fn columns_signature(&self, question: Question, precision: Precision) -> String {
         let (number, name) = (C.number(precision), columns_name(self.file, question, precision));
         let points: Vec<String> = ["x", "y", "z"].map(|axis| format!("const {number} *{axis}")).to_vec();
         let results: Vec<String> = question.results().iter().map(|r| format!("{number} *{r}")).collect();
@@ -332,7 +332,7 @@ impl CFile<'_> {
         }
     }
 
-    pub fn uniforms_name(&self, program: &Program) -> String {
+    fn uniforms_name(&self, program: &Program) -> String {
         format!("{}_uniforms_{}", self.file.prefix, program.question.name())
     }
 
@@ -362,7 +362,7 @@ impl CFile<'_> {
     }
 
     /// Lines that fill `u`, if the program has uniforms.
-    pub fn fill_uniforms(&self, program: &Program, precision: Precision) -> Vec<String> {
+    fn fill_uniforms(&self, program: &Program, precision: Precision) -> Vec<String> {
         let count = program.uniform_count();
         let mut lines = Vec::new();
         if program.uniforms.is_none() {
@@ -393,7 +393,7 @@ impl CFile<'_> {
         lines
     }
 
-    pub fn at_name(&self, program: &Program, precision: Precision) -> String {
+    fn at_name(&self, program: &Program, precision: Precision) -> String {
         format!("{}_at_{}{}", self.file.prefix, program.question.name(), C.suffix(precision))
     }
 
@@ -472,12 +472,12 @@ impl CFile<'_> {
     }
 
     /// The structure of ω and ∇ω.
-    pub fn answer(&self, precision: Precision) -> String {
+    fn answer(&self, precision: Precision) -> String {
         format!("{}_answer{}", self.file.prefix, C.suffix(precision))
     }
 
     /// The function for one point.
-    pub fn point(&self, program: &Program, precision: Precision, room: Option<&Room>) -> Vec<String> {
+    fn point(&self, program: &Program, precision: Precision, room: Option<&Room>) -> Vec<String> {
         let question = program.question;
         let mut lines = vec![
             String::new(),

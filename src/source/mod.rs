@@ -36,6 +36,7 @@ mod c_calls;
 mod c_chunks;
 mod c_folds;
 mod c_header;
+mod c_linkage;
 mod c_links;
 mod c_room;
 mod c_waves;

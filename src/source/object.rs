@@ -1,6 +1,7 @@
 //! A solid as object code: the functions that a C file would have, and their header.
 
-use super::c_header::{columns_name, function_name, object_header};
+use super::c_header::object_header;
+use super::c_linkage::{columns_name, function_name};
 use super::language::C;
 use super::program::Program;
 use super::{File, Math, Options, SourceError, in_file};
