@@ -12,6 +12,7 @@ use cranelift_codegen::ir::{FuncRef, InstBuilder, MemFlagsData, Type, Value, typ
 use cranelift_frontend::FunctionBuilder;
 
 use super::host_functions::HostFunction;
+use super::machine::number_type;
 use super::sine::{Wanted, Waves};
 use crate::ir::{Binary, Expr, Forms, Graph, Lookup, Node, Tables, UnaryFunction};
 use crate::precision::Precision;
@@ -93,10 +94,7 @@ impl<'a, 'f> Emitter<'a, 'f> {
     }
 
     pub fn lane_type(&self) -> Type {
-        match self.precision {
-            Precision::F32 => types::F32,
-            Precision::F64 => types::F64,
-        }
+        number_type(self.precision)
     }
 
     pub fn vector_type(&self) -> Type {

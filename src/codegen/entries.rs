@@ -13,7 +13,7 @@ use cranelift_codegen::ir::{
 use cranelift_frontend::{FunctionBuilder, FunctionBuilderContext};
 use cranelift_module::{Linkage, Module};
 
-use super::machine::CodegenError;
+use super::machine::{CodegenError, number_type};
 use crate::precision::Precision;
 
 /// Two functions of an object file: for one point, and for columns of points.
@@ -51,10 +51,7 @@ pub struct EntryPrograms {
 /// [`CodegenError::Bug`] if a generated function is refused.
 pub(super) fn define(module: &mut impl Module, entry: &Entry) -> Result<(), CodegenError> {
     let pointer = module.target_config().pointer_type();
-    let number = match entry.precision {
-        Precision::F32 => types::F32,
-        Precision::F64 => types::F64,
-    };
+    let number = number_type(entry.precision);
     let time = entry.moves.then_some(types::F64);
     let params = entry.params.then_some(pointer);
     let between = || time.into_iter().chain(params);
@@ -110,10 +107,7 @@ impl Callees {
         entry: &Entry,
     ) -> Result<Self, cranelift_module::ModuleError> {
         let pointer = module.target_config().pointer_type();
-        let number = match entry.precision {
-            Precision::F32 => types::F32,
-            Precision::F64 => types::F64,
-        };
+        let number = number_type(entry.precision);
         let programs = &entry.programs;
         let uniforms = programs.uniforms.as_ref().map(|_| pointer);
         let params = entry.params.then_some(pointer);
@@ -148,10 +142,7 @@ struct Writer<'a, 'f> {
 
 impl Writer<'_, '_> {
     fn number(&self) -> Type {
-        match self.entry.precision {
-            Precision::F32 => types::F32,
-            Precision::F64 => types::F64,
-        }
+        number_type(self.entry.precision)
     }
 
     fn room(&mut self, bytes: u32) -> StackSlot {

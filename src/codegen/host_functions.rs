@@ -4,9 +4,10 @@
 
 use std::sync::Arc;
 
-use cranelift_codegen::ir::{AbiParam, Signature, Type, types};
+use cranelift_codegen::ir::{AbiParam, Signature, Type};
 use cranelift_codegen::isa::CallConv;
 
+use super::machine::number_type;
 use crate::ir::{Binary, BinaryFunction, Expr, Lookup, Part, Unary, UnaryFunction};
 use crate::precision::Precision;
 use crate::table::Table;
@@ -89,10 +90,7 @@ impl HostFunction {
 
     /// Its signature, with addresses of this type.
     pub fn signature(self, convention: CallConv, precision: Precision, pointer: Type) -> Signature {
-        let scalar = match precision {
-            Precision::F32 => types::F32,
-            Precision::F64 => types::F64,
-        };
+        let scalar = number_type(precision);
         let operands = match self {
             Self::Unary(_) => vec![scalar],
             Self::Binary(_) => vec![scalar; 2],

@@ -3,8 +3,11 @@
 use std::fmt;
 use std::sync::{Arc, OnceLock};
 
+use cranelift_codegen::ir::{Type, types};
 use cranelift_codegen::isa::{self, OwnedTargetIsa};
 use cranelift_codegen::settings::{self, Configurable};
+
+use crate::precision::Precision;
 
 /// The reason why a program could not be compiled.
 #[derive(Debug, Clone)]
@@ -95,5 +98,13 @@ pub fn target_description() -> String {
             format!("{} ({})", isa.triple(), names.join(" "))
         }
         Err(error) => error.to_string(),
+    }
+}
+
+/// The type of a number in this precision.
+pub fn number_type(precision: Precision) -> Type {
+    match precision {
+        Precision::F32 => types::F32,
+        Precision::F64 => types::F64,
     }
 }

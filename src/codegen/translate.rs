@@ -4,20 +4,19 @@ use rustc_hash::{FxHashMap, FxHashSet};
 
 use cranelift_codegen::Context;
 use cranelift_codegen::ir::condcodes::IntCC;
-use cranelift_codegen::ir::{AbiParam, Function, InstBuilder, MemFlagsData, UserFuncName, Value, types};
+use cranelift_codegen::ir::{AbiParam, Function, InstBuilder, MemFlagsData, UserFuncName, Value};
 use cranelift_frontend::{FunctionBuilder, FunctionBuilderContext};
 use cranelift_jit::{JITBuilder, JITModule};
 use cranelift_module::{FuncId, Linkage, Module, default_libcall_names};
 
 use super::emitter::{Emitter, Hosts};
 use super::host_functions::{HostFunction, Library};
-use super::machine::{CodegenError, target};
+use super::machine::{CodegenError, number_type, target};
 use super::memory::Code;
 use super::range::{self, Instructions};
 use super::request::{Request, Shape, pointers};
 use super::sine::{self, Wanted};
 use crate::ir::{Axis, Expr, Node, Unary, UnaryFunction};
-use crate::precision::Precision;
 
 /// The texts of a program that the code generator prints.
 #[derive(Debug, Clone)]
@@ -154,10 +153,7 @@ fn compiled_texts(context: &Context) -> (usize, String) {
 
 fn declare_parameters(function: &mut Function, module: &impl Module, request: Request<'_>) {
     let pointer = AbiParam::new(module.target_config().pointer_type());
-    let scalar = AbiParam::new(match request.precision {
-        Precision::F32 => types::F32,
-        Precision::F64 => types::F64,
-    });
+    let scalar = AbiParam::new(number_type(request.precision));
     let mut parameters = match request.shape {
         Shape::Point => vec![scalar, scalar, scalar, pointer],
         Shape::Batch | Shape::Range(_) | Shape::Slopes(_) => vec![pointer, pointer],
