@@ -101,8 +101,8 @@ pub(super) struct Check {
     /// Plot ω over a plane: x=…, y=… or z=…; several planes make a sheet: z=0.2,z=0.8,y=1.5
     #[arg(long, value_name = "AXIS=VALUE", value_parser = plane, value_delimiter = ',')]
     pub slice: Vec<Plane>,
-    /// The solid to measure and to plot; of several the sections are drawn together, hatched [default: all are measured,
-    /// and the only one or the first obstacle of the scene is plotted]
+    /// The solid to measure and to plot; of several the sections are drawn together, hatched [default: all are
+    /// measured, and the only one or the first obstacle of the scene is plotted]
     #[arg(short, long, value_name = "NAME", value_delimiter = ',')]
     pub solid: Vec<String>,
     /// Where the plot goes: .svg or .png [default: SOLID.AXIS=VALUE.svg; a sheet: slices.svg]
@@ -137,7 +137,8 @@ pub(super) struct Check {
     /// How messages are written; other forms than `human` go to standard output, in place of the solids
     #[arg(long, value_enum, value_name = "FORM", default_value_t = MessageFormat::Human, conflicts_with = "json")]
     pub message_format: MessageFormat,
-    /// Apply the fixes that do not change what a file means, then check it: `<` becomes `<=`, a missing `rfm 1` is added
+    /// Apply the fixes that do not change what a file means, then check it: `<` becomes `<=`, a missing `rfm 1` is
+    /// added
     #[arg(long)]
     pub fix: bool,
     #[command(flatten)]
@@ -332,10 +333,10 @@ pub(super) struct Build {
     /// Whose sin, exp and so on are called
     #[arg(long, value_enum, default_value_t = BuildMath::System)]
     pub math: BuildMath,
-    /// Keep the params of the file as arguments of the functions, in a structure, instead of constants. The sign and the
-    /// surface are those of the file with these values. ω has the same bits where params are lengths and factors; its last
-    /// ones may differ where a param is an angle of a rotation, and all of it off the surface where a param decides how
-    /// far a repeated, lofted, twisted or rounded shape reaches. Gradients may round differently
+    /// Keep the params of the file as arguments of the functions, in a structure, instead of constants. The sign and
+    /// the surface are those of the file with these values. ω has the same bits where params are lengths and factors;
+    /// its last ones may differ where a param is an angle of a rotation, and all of it off the surface where a param
+    /// decides how far a repeated, lofted, twisted or rounded shape reaches. Gradients may round differently
     #[arg(long)]
     pub runtime_params: bool,
     /// The machine of an object file, as in x86_64-apple-darwin [default: this one, with all that its processor has]
@@ -350,7 +351,8 @@ pub(super) struct Build {
 pub(super) enum BuildWhat {
     /// 1 inside, 0 on the surface, −1 outside
     Sign,
-    /// Distance from the surface, positive outside: accurate near a face, an estimate far away, 0 where nothing is known
+    /// Distance from the surface, positive outside: accurate near a face, an estimate far away, 0 where nothing is
+    /// known
     Distance,
 }
 
@@ -387,8 +389,9 @@ pub(super) struct Run {
     /// Stop at this simulated time, in seconds or with a unit: 500ms
     #[arg(long, value_name = "TIME", value_parser = seconds, allow_negative_numbers = true)]
     pub until: Option<f64>,
-    /// Go on from the folder's last checkpoint; the scene's `run` block and probes may have changed. The result is that of
-    /// a run without a stop, bit for bit, unless it had ended between two frames (--until): the last step was cut short there
+    /// Go on from the folder's last checkpoint; the scene's `run` block and probes may have changed. The result is that
+    /// of a run without a stop, bit for bit, unless it had ended between two frames (--until): the last step was cut
+    /// short there
     #[arg(long)]
     pub resume: bool,
     /// Replace the run that the folder holds
@@ -404,8 +407,8 @@ pub(super) struct Run {
     /// 0.48,-1,0.46]
     #[arg(long, help_heading = "Pictures", value_name = "X,Y,Z", value_parser = camera, allow_hyphen_values = true)]
     pub camera: Option<CameraFlag>,
-    /// Cut obstacles open at a plane, the side towards the eye being taken away; `auto` cuts those that hide much of the
-    /// fluid where it begins, `none` none [default: the scene's, or auto]
+    /// Cut obstacles open at a plane, the side towards the eye being taken away; `auto` cuts those that hide much of
+    /// the fluid where it begins, `none` none [default: the scene's, or auto]
     #[arg(long, help_heading = "Pictures", value_name = "AXIS=VALUE|auto|none", value_parser = cut)]
     pub cut: Option<CutFlag>,
     /// Do not draw an obstacle; may be repeated
@@ -441,8 +444,9 @@ fn precision() -> impl TypedValueParser<Value = Precision> {
 
 #[derive(Debug, Args)]
 pub(super) struct Explain {
-    /// The code of a message (E0201), `codes` for a list of them; a word of the language or a key of a scene (twist, spacing),
-    /// `words` for all of them; `outputs` for what a run writes, or a key of its summary; or a file, FILE:SOLID or FILE:SCENE
+    /// The code of a message (E0201), `codes` for a list of them; a word of the language or a key of a scene (twist,
+    /// spacing), `words` for all of them; `outputs` for what a run writes, or a key of its summary; or a file,
+    /// FILE:SOLID or FILE:SCENE
     #[arg(value_name = "CODE|WORD|FILE[:NAME]", required_unless_present = "methods")]
     pub subject: Option<String>,
     /// List the methods of the fluid solver, with the keys, units, defaults and passes of each, as Markdown

@@ -3,7 +3,7 @@
 use glam::{BVec3, DVec3};
 
 use super::failure::{Failure, note};
-use rfm::geom::{Aabb, to_thousandths};
+use rfm::geom::{Aabb, significant};
 use rfm::mesh::{Mesh, split_creases};
 use rfm::render::{self, Backdrop, Camera, Cut, Legend, Material, MeshView};
 use rfm::slice::Plane;
@@ -47,8 +47,8 @@ pub(super) fn tell_of_aim(domain: &Aabb, look_at: Option<DVec3>) {
     if let Some(at) = look_at.filter(|at| at.is_finite() && !domain.contains(*at)) {
         note(format!(
             "the place to look at, {at}, lies outside of the box that is drawn, {} to {}: its pictures may be empty",
-            to_thousandths(domain.min),
-            to_thousandths(domain.max)
+            domain.min.map(significant),
+            domain.max.map(significant)
         ));
     }
 }

@@ -66,7 +66,11 @@ impl Reader for Folder {
 pub fn text_of(bytes: Vec<u8>) -> std::io::Result<String> {
     String::from_utf8(bytes).map_err(|error| {
         let at = error.utf8_error().valid_up_to();
-        let message = format!("it is not a UTF-8 text (byte {at} does not belong to a character)");
+        // the marks with which editors begin texts of 16-bit characters
+        let message = match error.as_bytes() {
+            [0xff, 0xfe, ..] | [0xfe, 0xff, ..] => "it is a UTF-16 text: save it as UTF-8".into(),
+            _ => format!("it is not a UTF-8 text (byte {at} does not belong to a character)"),
+        };
         std::io::Error::new(std::io::ErrorKind::InvalidData, message)
     })
 }

@@ -230,10 +230,9 @@ pub(super) fn many_steps(scene: &Scene, parameters: &Parameters) -> Option<Diagn
     let steps = scene.run.until / step;
     (steps >= MANY_STEPS).then(|| {
         let of = match cause == VISCOSITY {
-            true => format!(
-                " of {:?} Pa·s at a density of {:?} kg/m³",
-                scene.fluid.viscosity, scene.fluid.density
-            ),
+            true => {
+                format!(" of {} Pa·s at a density of {} kg/m³", scene.fluid.viscosity, scene.fluid.density)
+            }
             false => String::new(),
         };
         let message =

@@ -21,7 +21,9 @@ fn solid(expression: &str) -> String {
 
 #[test]
 fn not_a_text() {
-    check([0xff, 0xfe, 0x00, 0x41], 2, "not a UTF-8 text (byte 0 ");
+    check([0xff, 0xc0, 0x00, 0x41], 2, "not a UTF-8 text (byte 0 ");
+    check([0xff, 0xfe, 0x41, 0x00], 2, "it is a UTF-16 text: save it as UTF-8");
+    check([0xfe, 0xff, 0x00, 0x41], 2, "it is a UTF-16 text: save it as UTF-8");
     check(b"rfm 1\nsolid s = sphere(\xff)", 2, "byte 23 ");
     check(b"rfm 1\nsolid s = sphere(1)\0\n", 1, "unexpected character U+0000");
     check([0; 5000], 1, "unexpected character U+0000");

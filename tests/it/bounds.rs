@@ -53,7 +53,7 @@ fn rounded_and_offset_shapes_end_where_their_parts_do() {
     check("(sphere(1) or box([0,0,0],[2,2,2])).offset(0.5)", [-1.5; 3], [2.5; 3], 1e-5);
 }
 
-/// Of bounds that may be too large, that is known.
+/// Bounds that may be too large say so.
 #[test]
 fn bounds_are_tight_or_said_not_to_be() {
     for text in ["sphere(1)", "box([0,0,0],[9,3,0.4])", "torus(1, 0.25).rotate_x(0.3)"] {

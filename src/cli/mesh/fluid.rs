@@ -256,6 +256,7 @@ impl Job<'_> {
             Failure::usage(format!("cannot mesh the frame `{}`: {error}\n{rest}", path.shown()))
         };
         let bytes = std::fs::read(&path).map_err(|error| failed(error.to_string()))?;
+        output::remember_input(&path);
         let points = read_points(&bytes).map_err(|error| failed(error.to_string()))?;
         let finite: Vec<DVec3> = points.iter().copied().filter(|p| p.is_finite()).collect();
         let mesh = self.scale.surface.mesh(&finite).map_err(|error| failed(error.to_string()))?;

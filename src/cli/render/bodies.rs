@@ -7,7 +7,7 @@ use glam::DVec3;
 use super::look::{Look, Opened};
 use super::options::Render;
 use crate::cli::failure::Failure;
-use crate::cli::output::Shown;
+use crate::cli::output::{self, Shown};
 use crate::cli::saved::{self, RunFigures};
 use crate::cli::scenery::{Drawn, glass, opened_by, out_of_the_way};
 use rfm::fluid_surface::{FrameEntry, read_arrays, read_mesh};
@@ -97,6 +97,7 @@ impl Bodies {
 pub(super) fn bodies_of(path: &Path, count: usize) -> Result<Vec<Mesh>, Failure> {
     let failed = |error: String| Failure::usage(format!("cannot read `{}`: {error}", path.shown()));
     let file = std::fs::read(path).map_err(|error| failed(error.to_string()))?;
+    output::remember_input(path);
     let whole = read_mesh(&file).map_err(|error| failed(error.to_string()))?;
     if count <= 1 {
         return Ok(vec![whole]);

@@ -211,6 +211,7 @@ impl RunScene {
         let failed =
             |error: String| Failure::usage(format!("cannot read the frame `{}`: {error}", path.shown()));
         let file = std::fs::read(&path).map_err(|error| failed(error.to_string()))?;
+        output::remember_input(&path);
         let (mut points, arrays) = read_arrays(&file).map_err(|error| failed(error.to_string()))?;
         let name = &self.shown.name;
         let own = arrays.iter().find(|array| array.name == *name && array.components == 1);
@@ -281,6 +282,7 @@ fn factor(factor: f64) -> String {
 fn surface_of(path: &Path) -> Result<Mesh, Failure> {
     let failed = |error: String| Failure::usage(format!("cannot read `{}`: {error}", path.shown()));
     let file = std::fs::read(path).map_err(|error| failed(error.to_string()))?;
+    output::remember_input(path);
     read_mesh(&file).map_err(|error| failed(error.to_string()))
 }
 

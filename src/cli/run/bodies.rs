@@ -96,8 +96,8 @@ impl Bodies {
         }
     }
 
-    /// What the meshes at a time, s, do not show, in words, for each solid of which something was found in a while. Sharp
-    /// edges are left out.
+    /// What the meshes at a time, s, do not show, in words, for each solid of which something was found in a while.
+    /// Sharp edges are left out.
     pub fn missed_at(&self, time: f64) -> Result<Vec<String>, Failure> {
         let mut missed = Vec::new();
         for solid in &self.solids {

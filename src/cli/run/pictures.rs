@@ -113,6 +113,7 @@ impl Pictures {
     /// Prepares the pictures. `meshes` are those of the bodies at the start.
     pub fn new(look: Look<'_>, experiment: &Experiment, meshes: &[Mesh]) -> Result<Self, Failure> {
         let domain = experiment.domain();
+        scenery::tell_of_aim(&domain, look.camera.and_then(|flag| flag.look_at));
         let camera = camera(look, experiment, Camera::SIZE)?;
         let opened = opened(look, experiment, meshes)?;
         let title = title(experiment, &opened);
@@ -239,10 +240,7 @@ fn moving(domain: &Aabb, bodies: &[Body], meshes: &[Mesh]) -> Vec<(Drawn, Mesh)>
 fn camera(look: Look<'_>, experiment: &Experiment, size: (u32, u32)) -> Result<Camera, Failure> {
     let stated = &experiment.scene().picture;
     let (towards_eye, aim) = match look.camera {
-        Some(flag) => {
-            scenery::tell_of_aim(&experiment.domain(), flag.look_at);
-            (Some(flag.towards_eye), (flag.look_at, flag.zoom))
-        }
+        Some(flag) => (Some(flag.towards_eye), (flag.look_at, flag.zoom)),
         None => (stated.camera, (stated.look_at, stated.zoom)),
     };
     scenery::camera(&experiment.domain(), towards_eye, aim, size)

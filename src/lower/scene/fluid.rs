@@ -11,6 +11,25 @@ use crate::quantity::{Bound, Dimension};
 use crate::sph::{Fill, KeyBlock, KeyReader, Method};
 use crate::syntax::ast::Entry;
 
+/// What a fluid has at the start and not later, and what is said where it depends on the time.
+pub(super) struct Start {
+    what: &'static str,
+    label: &'static str,
+    help: &'static str,
+}
+
+const OF_SHAPE: Start = Start {
+    what: "shape",
+    label: "its shape at t = 0 is filled",
+    help: "to bring the fluid into motion, state its `velocity` or move an obstacle",
+};
+
+pub(super) const OF_VELOCITY: Start = Start {
+    what: "velocity",
+    label: "its velocity at t = 0 is that of the particles",
+    help: "what drives the fluid later is `gravity`, which may depend on the time, or an obstacle that moves",
+};
+
 declare_keys! {
     /// Keys of a fluid that every method has.
     mod keys {
@@ -163,7 +182,7 @@ impl<'a> Lowering<'a> {
         let shape = match block.setting(keys::SHAPE.name) {
             Some((_, value)) => self.shape(value).map(|node| {
                 self.warn_of_constant("the fluid's shape", node, value);
-                self.warn_of_time("shape", &[node], value.span);
+                self.warn_of_time(&OF_SHAPE, &[node], value.span);
                 (node, value.span)
             }),
             None => {
@@ -214,22 +233,13 @@ impl<'a> Lowering<'a> {
     }
 
     /// Warns of a fluid's shape or velocity that depends on the time: particles are placed once.
-    pub(super) fn warn_of_time(&mut self, what: &str, nodes: &[Node], at: Span) {
+    pub(super) fn warn_of_time(&mut self, start: &Start, nodes: &[Node], at: Span) {
         if !nodes.iter().any(|&node| self.module.graph.uses(node, Axis::T)) {
             return;
         }
-        let (label, help) = match what {
-            "velocity" => (
-                "its velocity at t = 0 is that of the particles",
-                "what drives the fluid later is `gravity`, which may depend on the time, or an obstacle that moves",
-            ),
-            _ => (
-                "its shape at t = 0 is filled",
-                "to bring the fluid into motion, state its `velocity` or move an obstacle",
-            ),
-        };
+        let Start { what, label, help } = start;
         let message = format!("the fluid's {what} depends on the time, and particles are placed once");
-        self.report(Diagnostic::warning(Code::FLUID_OF_TIME, at, message).at(label).help(help));
+        self.report(Diagnostic::warning(Code::FLUID_OF_TIME, at, message).at(*label).help(*help));
     }
 
     /// Reads density, mass and support radius of the particles. A spacing may replace the mass.

@@ -6,7 +6,7 @@ use super::super::lowering::Lowering;
 use super::declaration::declare_keys;
 use super::{Block, Opening, Picture};
 use crate::diagnostic::{Code, Diagnostic};
-use crate::geom::Aabb;
+use crate::geom::{self, Aabb};
 use crate::quantity::Dimension;
 use crate::syntax::ast::{Comparison, Expr, ExprKind};
 
@@ -55,7 +55,7 @@ impl<'a> Lowering<'a> {
             let message = "the place to look at lies outside of the box, where nothing is drawn";
             self.report(
                 Diagnostic::warning(Code::PICTURE_ASIDE, value.span, message)
-                    .help(format!("the middle of the box is {}", domain.centre())),
+                    .help(format!("the middle of the box is {}", domain.centre().map(geom::significant))),
             );
         }
         let zoom = self.zoom(&block)?;

@@ -5,7 +5,7 @@ use glam::DVec3;
 use super::super::lowering::Lowering;
 use super::super::probes::Surroundings;
 use super::declaration::{SceneKey, declare_keys, names};
-use super::fluid::FluidAndMethod;
+use super::fluid::{FluidAndMethod, OF_VELOCITY};
 use super::{Block, Bounce, Container, Gravity, Obstacle, Run, Scene, Skin, Tolerance};
 use crate::diagnostic::{Code, Diagnostic, Span};
 use crate::geom::Aabb;
@@ -112,7 +112,7 @@ impl<'a> Lowering<'a> {
             // a known solution may serve as the start
             let is_known = truth.is_some_and(|truth| truth.velocity == Some(fluid.velocity));
             if let Some(at) = fluid.velocity_span.filter(|_| !is_known) {
-                self.warn_of_time("velocity", &fluid.velocity, at);
+                self.warn_of_time(&OF_VELOCITY, &fluid.velocity, at);
             }
         }
         let container_name = container.iter().map(|c| &c.name[..]);

@@ -46,7 +46,7 @@ impl Slip<'_> {
             let start = self.at - line.len();
             let span = Span::new(self.span.source, start, start + word.len());
             Diagnostic::error(Code::SYNTAX, span, format!("`{word}` within a block"))
-                .help("items stand outside of scenes: move the line above the scene that uses it")
+                .help("items stand outside of scenes: move the line above the scene that uses it, or close the block with `}`")
         })
     }
 
@@ -58,7 +58,7 @@ impl Slip<'_> {
         let span = Span::new(self.span.source, self.at, self.at + text.len() + 2);
         let diagnostic =
             Diagnostic::error(Code::SYNTAX, span, format!("unexpected text `\"{}\"`", text.escape_debug()));
-        if ITEM_WORDS.contains(&head) || self.in_braces() && behind.starts_with('{') {
+        if ITEM_WORDS.contains(&head) || !head.is_empty() && self.in_braces() && behind.starts_with('{') {
             let name: String = text.chars().map(|c| if c.is_alphanumeric() { c } else { '_' }).collect();
             let name = name.trim_matches('_');
             let is_name = name.starts_with(char::is_alphabetic);

@@ -276,10 +276,10 @@ impl PySolid {
     ///
     /// Returns
     /// -------
-    /// `Contact`: ``distance`` of shape (...), m, positive outside, infinite where no surface is found; ``normal`` of shape (..., 3), the outward unit
-    /// normal of the nearest face, the mean of two at an edge, zero where there is none; ``curvature`` of shape
-    /// (...), the mean curvature, 1/m, positive where the solid is convex. Away from the face it is that of the
-    /// surface of equal distance through the point.
+    /// `Contact`: ``distance`` of shape (...), m, positive outside, infinite where no surface is found; ``normal`` of
+    /// shape (..., 3), the outward unit normal of the nearest face, the mean of two at an edge, zero where there is
+    /// none; ``curvature`` of shape (...), the mean curvature, 1/m, positive where the solid is convex. Away from the
+    /// face it is that of the surface of equal distance through the point.
     #[pyo3(signature = (points, y=None, z=None, /, *, out=None, threads=Threads::Auto))]
     #[pyo3(text_signature = "($self, points, y=None, z=None, /, *, out=None, threads=None)")]
     fn contact<'py>(
@@ -310,8 +310,8 @@ impl PySolid {
         CLASS.import(py, "rfm._records", "Contact")?.call1((distance, normal, curvature))
     }
 
-    /// The velocity of the surface near points, as `rfm_wall_velocity` in C: zero for a solid at rest. For a solid that is
-    /// moved and turned as a whole it is that of the body, for others that of the nearest face along its normal.
+    /// The velocity of the surface near points, as `rfm_wall_velocity` in C: zero for a solid at rest. For a solid that
+    /// is moved and turned as a whole it is that of the body, for others that of the nearest face along its normal.
     ///
     /// Parameters
     /// ----------
@@ -344,8 +344,8 @@ impl PySolid {
         )
     }
 
-    /// Radii of balls around points that are proven not to meet the surface, as ``rfm eval --what clearance``: never more
-    /// than the distance, and mostly within 1e-4 of it. It takes a thousand times as long as `contact`.
+    /// Radii of balls around points that are proven not to meet the surface, as ``rfm eval --what clearance``: never
+    /// more than the distance, and mostly within 1e-4 of it. It takes a thousand times as long as `contact`.
     ///
     /// Parameters
     /// ----------
@@ -356,8 +356,8 @@ impl PySolid {
     ///
     /// Returns
     /// -------
-    /// Array of shape (...), m, positive inside, too, and always finite: nothing is looked for farther away than 3.6e75,
-    /// which is the clearance of a solid without a surface, 3.4e38 in single precision.
+    /// Array of shape (...), m, positive inside, too, and always finite: nothing is looked for farther away than
+    /// 3.6e75, which is the clearance of a solid without a surface, 3.4e38 in single precision.
     #[pyo3(signature = (points, y=None, z=None, /, *, out=None, threads=Threads::Auto))]
     #[pyo3(text_signature = "($self, points, y=None, z=None, /, *, out=None, threads=None)")]
     fn clearance<'py>(
