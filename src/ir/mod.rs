@@ -67,4 +67,5 @@ pub(crate) use on_path::enclosure::{Enclosure, EnclosureEvaluator};
 pub(crate) use on_path::polynomial::polynomial_on_path;
 pub(crate) use op::R0;
 pub use op::{Binary, Unary};
+pub(crate) use parametrised::Scalar;
 pub use real::Real;

@@ -5,7 +5,8 @@ use std::collections::BTreeSet;
 use super::c_blocks::Blocks;
 use super::c_folds::Folds;
 use super::c_linkage::{columns_name, function_name, guard, in_c};
-use super::c_room::Room;
+use super::c_room::{Long, Room};
+use super::c_table::Table;
 use super::language::{C, Function};
 use super::operations::{Names, Operation, WEIGHTED_FIELDS};
 use super::program::{Program, Question};
@@ -16,6 +17,9 @@ use crate::precision::Precision;
 
 /// A function with more operations than this is divided: gcc -O3 needs time that grows faster than its length.
 const LONGEST_FUNCTION: usize = 1500;
+
+/// A function with more operations than this is not inlined in each of those that call it.
+const LONGEST_INLINED: usize = 200;
 
 /// gcc takes the choices of one result after the other for partly redundant and moves them into branches, which it then
 /// does not vectorise. Clang does not. Functions with options of their own are not inlined into those without, so a header leaves
@@ -78,7 +82,7 @@ pub(super) fn source(file: &File<'_>, flavour: Flavour) -> Result<String, Source
             operations.extend(body.operations.iter().map(|&op| (op, precision == Precision::F32)));
             called.extend(body.functions.iter().map(|&function| (function, precision == Precision::F32)));
             functions.extend(body.lines);
-            let long = steps.as_ref().filter(|steps| steps.are_for_points).map(|steps| &steps.room);
+            let long = steps.as_ref().filter(|steps| steps.are_for_points);
             functions.extend(writer.point(program, precision, long));
             functions.extend(writer.columns(program, precision, steps.as_ref()));
             if flavour == Flavour::Cuda {
@@ -109,6 +113,7 @@ struct Steps {
     /// The function of one block.
     name: String,
     room: Room,
+    table: Table,
     /// Whether single points take them as well: the formula is too long for one function.
     are_for_points: bool,
 }
@@ -348,7 +353,9 @@ impl CFile<'_> {
         let arguments = self.extra_arguments();
         let arguments = arguments.trim_start_matches(", ");
         let name = self.uniforms_name(program);
-        let mut lines = vec![String::new(), format!("RFM_INLINE void {name}({arguments}, double *u) {{")];
+        let is_long = made.lines.len() > LONGEST_INLINED && self.flavour != Flavour::Cuda;
+        let linkage = if is_long { "RFM_NOINLINE" } else { "RFM_INLINE" };
+        let mut lines = vec![String::new(), format!("{linkage} void {name}({arguments}, double *u) {{")];
         lines.extend(made.lines.iter().map(|line| format!("    {line}")));
         lines.extend(made.outputs.iter().enumerate().map(|(i, text)| format!("    u[{i}] = {text};")));
         if self.file.moves && !roots.iter().any(|&root| graph.uses_time(root)) {
@@ -397,27 +404,27 @@ impl CFile<'_> {
         format!("{}_at_{}{}", self.file.prefix, program.question.name(), C.suffix(precision))
     }
 
-    /// A program that is too long for one function, and the room that its blocks of points need: in parts where it has them,
-    /// or as a chain, whichever has the shorter functions.
-    fn long(&self, program: &Program, precision: Precision) -> Result<(Statements, Room), SourceError> {
+    /// A program that is too long for one function: in parts where it has them, or as a chain, whichever has the shorter
+    /// functions.
+    fn long(&self, program: &Program, precision: Precision) -> Result<Long, SourceError> {
         let (names, name) = (self.names(), self.at_name(program, precision));
         let uniform = |i: u32| format!("u[{i}]");
         let writer = self.writer(&names, precision, &uniform, &|_| String::new());
-        let folds = Folds::of(program, precision);
-        let chain = folds.write(&writer, &name, program)?;
+        let chain = Folds::of(program, precision).write(&writer, &name, program)?;
         if let Some(blocks) = Blocks::of(program, precision) {
             let parts = blocks.write(&writer, &name, program)?;
             if parts.length < chain.length {
-                return Ok((parts.made, blocks.room));
+                return Ok(parts);
             }
         }
-        Ok((chain.made, folds.room))
+        Ok(chain)
     }
 
     fn body(&self, program: &Program, precision: Precision) -> Result<(Body, Option<Steps>), SourceError> {
         if self.flavour != Flavour::Cuda && program.operations() > LONGEST_FUNCTION {
-            let (Statements { lines, operations, functions, .. }, room) = self.long(program, precision)?;
-            let steps = Steps { name: self.at_name(program, precision), room, are_for_points: true };
+            let Long { made, room, table, .. } = self.long(program, precision)?;
+            let Statements { lines, operations, functions, .. } = made;
+            let steps = Steps { name: self.at_name(program, precision), room, table, are_for_points: true };
             return Ok((Body { lines, operations, functions }, Some(steps)));
         }
         let mut body = self.whole(program, precision)?;
@@ -429,11 +436,11 @@ impl CFile<'_> {
         let uniform = |i: u32| format!("u[{i}]");
         let writer = self.writer(&names, precision, &uniform, &|_| String::new());
         let name = format!("{}_steps_{}{}", self.file.prefix, program.question.name(), C.suffix(precision));
-        let made = folds.write(&writer, &name, program)?.made;
+        let Long { made, room, table, .. } = folds.write(&writer, &name, program)?;
         body.lines.extend(made.lines);
         body.operations.extend(made.operations);
         body.functions.extend(made.functions);
-        Ok((body, Some(Steps { name, room: folds.room, are_for_points: false })))
+        Ok((body, Some(Steps { name, room, table, are_for_points: false })))
     }
 
     /// A program as one function, for one point.
@@ -477,17 +484,17 @@ impl CFile<'_> {
     }
 
     /// The function for one point.
-    fn point(&self, program: &Program, precision: Precision, room: Option<&Room>) -> Vec<String> {
+    fn point(&self, program: &Program, precision: Precision, steps: Option<&Steps>) -> Vec<String> {
         let question = program.question;
         let mut lines = vec![
             String::new(),
             format!("{}{} {{", self.flavour.linkage(), self.point_signature(question, precision)),
         ];
         lines.extend(self.fill_uniforms(program, precision));
-        let (number, name) = (C.number(precision), self.at_name(program, precision));
+        let name = self.at_name(program, precision);
         let u = if program.uniforms.is_some() { ", u" } else { "" };
-        if let Some(room) = room {
-            lines.extend(room.point(&name, number, question));
+        if let Some(Steps { name, room, table, .. }) = steps {
+            lines.extend(room.point(name, question, table));
         } else if question == Question::Gradient {
             lines.push(format!("    const {} all = {name}(x, y, z{u});", self.answer(precision)));
             let parts = ["gx", "gy", "gz"].iter().enumerate();
@@ -509,10 +516,10 @@ impl CFile<'_> {
             .replace("RFM_RESTRICT p", "p");
         let mut lines = vec![String::new(), format!("{}{signature} {{", self.flavour.linkage())];
         lines.extend(self.fill_uniforms(program, precision));
-        let (number, name) = (C.number(precision), self.at_name(program, precision));
+        let name = self.at_name(program, precision);
         let u = if program.uniforms.is_some() { ", u" } else { "" };
-        if let Some(Steps { name, room, .. }) = steps {
-            lines.extend(room.columns(name, number, question));
+        if let Some(Steps { name, room, table, .. }) = steps {
+            lines.extend(room.columns(name, question, table));
             lines.push("}".into());
             return lines;
         }

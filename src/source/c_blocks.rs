@@ -1,7 +1,7 @@
 //! Formulas that are too long for one function of C: steps over blocks of points, from a table.
 //!
 //! These are the steps of the machine code, see `solid::programs::block_plan`: parts of one shape share a function
-//! and differ in a table of constants, and each operation that joins them is a short loop. A solid of 500 balls is
+//! and differ in a table of numbers, and each operation that joins them is a short loop. A solid of 500 balls is
 //! compiled as one ball.
 
 use std::cell::RefCell;
@@ -9,7 +9,8 @@ use std::collections::HashMap;
 
 use super::SourceError;
 use super::c_chunks::{Chunk, chunks};
-use super::c_room::{Called, IN_COLUMNS, Long, Room};
+use super::c_room::{IN_COLUMNS, Long, Room};
+use super::c_table::{Called, Table};
 use super::language::C;
 use super::operations::{Operation, WEIGHTED_FIELDS};
 use super::program::Program;
@@ -18,26 +19,26 @@ use crate::ir::{Axis, Binary, Expr, Form, Forms, Graph, Node};
 use crate::precision::Precision;
 use crate::solid::{BlockPlan, BlockStep, ColumnPlace, JoiningOperation, Piece};
 
-/// A plan with more constants for each node than this is refused: its parts hold one another, as those of folds by
+/// A plan with more numbers for each node than this is refused: its parts hold one another, as those of folds by
 /// `blend` do, and the table grows with the square of their number.
-const MOST_CONSTANTS: usize = 2;
+const MOST_NUMBERS: usize = 2;
 
 /// A program as steps.
 pub(super) struct Blocks {
     plan: BlockPlan,
     steps: Vec<Step>,
     /// Its columns are those of the plan, and those that the chunks of long pieces hand on.
-    pub room: Room,
+    room: Room,
 }
 
 /// A step of the plan, or a part of one.
 enum Step {
     Planned(BlockStep),
-    /// A chunk of a piece, by the piece's number. `constants` says where those of a piece with parameters begin.
+    /// A chunk of a piece, by the piece's number. `numbers` says where those of a piece with parameters begin.
     Chunk {
         piece: usize,
         chunk: Chunk,
-        constants: Option<usize>,
+        numbers: Option<usize>,
         reads: Vec<ColumnPlace>,
         writes: Vec<ColumnPlace>,
     },
@@ -58,9 +59,7 @@ enum Action {
 struct Written {
     made: Statements,
     called: Vec<Called>,
-    constants: Vec<f64>,
-    /// The table: the number of a function, counted from 1, its constants and its columns.
-    table: Vec<i64>,
+    table: Table,
     actions: Vec<(Action, usize)>,
     /// Functions of chunks by their texts.
     chunks: HashMap<String, usize>,
@@ -70,7 +69,7 @@ impl Blocks {
     /// `None` if the graph has no parts that would be steps, or none that are apart.
     pub fn of(program: &Program, precision: Precision) -> Option<Self> {
         let plan = BlockPlan::new(&program.graph, &program.outputs, program.forms(precision))?;
-        if plan.constants.len() > MOST_CONSTANTS * program.graph.len() {
+        if plan.numbers.len() > MOST_NUMBERS * program.graph.len() {
             return None;
         }
         let mut columns = plan.columns;
@@ -85,27 +84,28 @@ impl Blocks {
     }
 
     /// The functions and tables: in the end a function that evaluates one block.
-    pub fn write(&self, writer: &Writer<'_>, name: &str, program: &Program) -> Result<Long, SourceError> {
-        let mut written = Written { constants: self.plan.constants.clone(), ..Written::default() };
+    pub fn write(self, writer: &Writer<'_>, name: &str, program: &Program) -> Result<Long, SourceError> {
+        let table = Table { numbers: self.plan.numbers.clone(), steps: Vec::new() };
+        let mut written = Written { table, ..Written::default() };
         for step in &self.steps {
             match step {
                 Step::Planned(step) => {
                     let called = self.planned(Action::of(step), name, (writer, program), &mut written)?;
-                    written.table.push(called as i64 + 1);
-                    written.table.extend(operands(step));
+                    written.table.steps.push(called as i64 + 1);
+                    written.table.steps.extend(operands(step));
                 }
-                Step::Chunk { piece, chunk, constants, reads, writes } => {
+                Step::Chunk { piece, chunk, numbers, reads, writes } => {
                     let function = format!("{name}_chunk{}", written.chunks.len());
                     let graph = self.plan.pieces[*piece].shape.as_ref().unwrap_or(&program.graph);
-                    self.chunk((graph, chunk, *constants), &function, writer, &mut written)?;
-                    written.table.extend(reads.iter().chain(writes).map(column));
+                    self.chunk((graph, chunk, *numbers), &function, writer, &mut written)?;
+                    written.table.steps.extend(reads.iter().chain(writes).map(column));
                 }
             }
         }
-        let Written { mut made, called, constants, table, .. } = written;
+        let Written { mut made, called, table, .. } = written;
         let length = made.lines.len();
-        self.room.tables(name, &called, (&constants, &table), &mut made.lines);
-        Ok(Long { made, length })
+        table.write(name, &called, &self.room, &mut made.lines);
+        Ok(Long { made, length, room: self.room, table })
     }
 
     /// The number of the function for what a step of the plan does, which is written if it is new.
@@ -125,11 +125,11 @@ impl Blocks {
                 let piece = &self.plan.pieces[number];
                 self.piece(piece, &function, (writer, program), &mut written.made)?;
                 let columns = piece.inputs.len() + piece.outputs.len();
-                Called { name: function, is_piece: true, has_constants: piece.parameters > 0, columns }
+                Called { name: function, is_piece: true, has_numbers: piece.parameters > 0, columns }
             }
             Action::Join(..) | Action::Weighted(..) | Action::Negate | Action::Copy => {
                 self.action(action, &function, writer, &mut written.made)?;
-                Called { name: function, is_piece: false, has_constants: false, columns: action.columns() }
+                Called { name: function, is_piece: false, has_numbers: false, columns: action.columns() }
             }
         };
         written.called.push(called);
@@ -140,14 +140,15 @@ impl Blocks {
     /// A chunk of a long piece: its function, if none has its text yet, and its first numbers in the table.
     fn chunk(
         &self,
-        (graph, chunk, constants): (&Graph, &Chunk, Option<usize>),
+        (graph, chunk, numbers): (&Graph, &Chunk, Option<usize>),
         name: &str,
         writer: &Writer<'_>,
         written: &mut Written,
     ) -> Result<(), SourceError> {
         let gathered = RefCell::new(Vec::new());
         let parameter = |i: u32| format!("c[{i}]");
-        let writer = Writer { axes: IN_COLUMNS, gathered: Some(&gathered), parameter: &parameter, ..*writer };
+        let to_gather = numbers.is_none().then_some(&gathered); // those of a shape are its parameters already
+        let writer = Writer { axes: IN_COLUMNS, gathered: to_gather, parameter: &parameter, ..*writer };
         let inputs: Vec<(Node, String)> =
             chunk.reads.iter().enumerate().map(|(i, &node)| (node, format!("r{i}[i]"))).collect();
         let forms = Forms::default(); // a piece has no R₀
@@ -155,22 +156,23 @@ impl Blocks {
         let body = writer.statements(&part)?;
         let text = body.lines.join("\n") + &body.outputs.join(",");
         let gathered = gathered.into_inner();
-        let has_constants = constants.is_some() || !gathered.is_empty();
+        let has_numbers = numbers.is_some() || !gathered.is_empty();
         let known = written.chunks.get(&text).copied();
         let called = known.unwrap_or_else(|| {
             let counts = [chunk.reads.len(), chunk.writes.len()];
-            self.room.loop_of(name, counts, has_constants, (&body, None), &mut written.made);
+            self.room.loop_of(name, counts, has_numbers, (&body, None), &mut written.made);
             let columns = chunk.reads.len() + chunk.writes.len();
-            written.called.push(Called { name: name.into(), is_piece: true, has_constants, columns });
+            written.called.push(Called { name: name.into(), is_piece: true, has_numbers, columns });
             written.chunks.insert(text, written.called.len() - 1);
             written.called.len() - 1
         });
-        written.table.push(called as i64 + 1);
-        if let Some(first) = constants {
-            written.table.push(first as i64);
-        } else if has_constants {
-            written.table.push(written.constants.len() as i64);
-            written.constants.extend(gathered);
+        let Table { numbers: all, steps } = &mut written.table;
+        steps.push(called as i64 + 1);
+        if let Some(first) = numbers {
+            steps.push(first as i64);
+        } else if has_numbers {
+            steps.push(all.len() as i64);
+            all.extend(gathered);
         }
         Ok(())
     }
@@ -296,8 +298,8 @@ fn column(place: &ColumnPlace) -> i64 {
 fn operands(step: &BlockStep) -> Vec<i64> {
     match step {
         BlockStep::Arithmetic { parameters, reads, writes, .. } => {
-            let constants = (!parameters.is_empty()).then_some(parameters.start as i64);
-            constants.into_iter().chain(reads.iter().chain(writes).map(column)).collect()
+            let numbers = (!parameters.is_empty()).then_some(parameters.start as i64);
+            numbers.into_iter().chain(reads.iter().chain(writes).map(column)).collect()
         }
         BlockStep::Junction { op: JoiningOperation::Negate, operands: [a, _], value, .. } => {
             [a, value].map(column).to_vec()
@@ -315,7 +317,7 @@ fn divided(plan: &BlockPlan, graph: &Graph, step: &BlockStep, columns: &mut usiz
     let BlockStep::Arithmetic { program, reads, writes, parameters } = step else { return None };
     let piece = &plan.pieces[*program];
     let graph = piece.shape.as_ref().unwrap_or(graph);
-    let constants = piece.shape.is_some().then_some(parameters.start);
+    let numbers = piece.shape.is_some().then_some(parameters.start);
     let chunks = chunks(graph, &piece.inputs, &piece.outputs)?;
     let mut last_read: HashMap<Node, usize> = HashMap::new();
     for (i, chunk) in chunks.iter().enumerate() {
@@ -346,7 +348,7 @@ fn divided(plan: &BlockPlan, graph: &Graph, step: &BlockStep, columns: &mut usiz
                 free.push(*column);
             }
         }
-        steps.push(Step::Chunk { piece: *program, chunk, constants, reads: read, writes: written });
+        steps.push(Step::Chunk { piece: *program, chunk, numbers, reads: read, writes: written });
     }
     *columns = (*columns).max(next as usize);
     Some(steps)

@@ -1,7 +1,7 @@
 //! Formulas that are too long for one function of C, as a chain of short pieces: sums, products, folds by `blend`.
 //!
 //! Each piece is a loop over the points of a block, see `c_links`. Those of one shape share a function and differ in a table
-//! of constants, so a fold of 500 parts is compiled as a few of them.
+//! of numbers, so a fold of 500 parts is compiled as a few of them.
 
 use std::cell::RefCell;
 use std::collections::HashMap;
@@ -9,17 +9,18 @@ use std::collections::HashMap;
 use super::SourceError;
 use super::c_calls::{is_of_waves, stages};
 use super::c_links::{Chunk, chunks};
-use super::c_room::{Called, IN_COLUMNS, Long, Room};
+use super::c_room::{IN_COLUMNS, Long, Room};
+use super::c_table::{Called, Table};
 use super::language::C;
 use super::program::Program;
 use super::statements::{Own, Part, Statements, Writer};
-use crate::ir::Node;
+use crate::ir::{Node, Scalar};
 use crate::precision::Precision;
 
 /// A program as steps.
 pub(super) struct Folds {
     steps: Vec<Step>,
-    pub room: Room,
+    room: Room,
 }
 
 /// A chunk with the numbers of its columns. Those of the caller are −1, −2 …
@@ -36,9 +37,9 @@ struct Shape {
     mend: Option<Statements>,
     reads: usize,
     writes: usize,
-    /// The constants of each of its steps.
-    constants: Vec<Vec<f64>>,
-    /// Which of the constants differ between its steps.
+    /// The numbers of each of its steps.
+    numbers: Vec<Vec<Scalar>>,
+    /// Which of the numbers differ between its steps.
     varying: Vec<usize>,
 }
 
@@ -59,29 +60,30 @@ impl Folds {
     }
 
     /// The functions and tables: in the end a function that evaluates one block.
-    pub fn write(&self, writer: &Writer<'_>, name: &str, program: &Program) -> Result<Long, SourceError> {
+    pub fn write(self, writer: &Writer<'_>, name: &str, program: &Program) -> Result<Long, SourceError> {
         let (shapes, places) = self.shapes(writer, program)?;
         let mut made = Statements::default();
         let mut called = Vec::new();
         for (number, shape) in shapes.iter().enumerate() {
-            let (name, has_constants) = (format!("{name}_part{number}"), !shape.varying.is_empty());
+            let (name, has_numbers) = (format!("{name}_part{number}"), !shape.varying.is_empty());
             let body = (&shape.body, shape.mend.as_ref());
-            self.room.loop_of(&name, [shape.reads, shape.writes], has_constants, body, &mut made);
-            called.push(Called { name, is_piece: true, has_constants, columns: shape.reads + shape.writes });
+            self.room.loop_of(&name, [shape.reads, shape.writes], has_numbers, body, &mut made);
+            called.push(Called { name, is_piece: true, has_numbers, columns: shape.reads + shape.writes });
         }
-        let (mut constants, mut table) = (Vec::new(), Vec::new());
+        let (mut numbers, mut table) = (Vec::new(), Vec::new());
         for (step, (number, member)) in self.steps.iter().zip(places) {
             let shape = &shapes[number];
             table.push(number as i64 + 1);
             if !shape.varying.is_empty() {
-                table.push(constants.len() as i64);
-                constants.extend(shape.varying.iter().map(|&k| shape.constants[member][k]));
+                table.push(numbers.len() as i64);
+                numbers.extend(shape.varying.iter().map(|&k| shape.numbers[member][k]));
             }
             table.extend(step.reads.iter().chain(&step.writes));
         }
         let length = made.lines.len();
-        self.room.tables(name, &called, (&constants, &table), &mut made.lines);
-        Ok(Long { made, length })
+        let table = Table { numbers, steps: table };
+        table.write(name, &called, &self.room, &mut made.lines);
+        Ok(Long { made, length, room: self.room, table })
     }
 
     /// The shapes of the steps, and the place of each step among them.
@@ -109,10 +111,10 @@ impl Folds {
                 let again = RefCell::new(Vec::new());
                 let slow = Writer { gathered: Some(&again), own: Own::Nothing, ..writer };
                 let mend = of_waves.then(|| slow.statements(&part)).transpose()?;
-                shapes.push(Shape { body, mend, reads, writes, constants: Vec::new(), varying: Vec::new() });
+                shapes.push(Shape { body, mend, reads, writes, numbers: Vec::new(), varying: Vec::new() });
             }
-            places.push((number, shapes[number].constants.len()));
-            shapes[number].constants.push(gathered.into_inner());
+            places.push((number, shapes[number].numbers.len()));
+            shapes[number].numbers.push(gathered.into_inner());
         }
         shapes.iter_mut().for_each(|shape| shape.settle(self.room.precision));
         Ok((shapes, places))
@@ -120,15 +122,19 @@ impl Folds {
 }
 
 impl Shape {
-    /// Finds the constants that differ between the steps, and writes the others into the text.
+    /// Finds the numbers that differ between the steps, and writes the others into the text.
     fn settle(&mut self, precision: Precision) {
-        let Some((first, others)) = self.constants.split_first() else { return };
-        let differs = |k: usize| others.iter().any(|other| other[k].to_bits() != first[k].to_bits());
+        let Some((first, others)) = self.numbers.split_first() else { return };
+        let differs = |k: usize| others.iter().any(|other| other[k] != first[k]);
         self.varying = (0..first.len()).filter(|&k| differs(k)).collect();
         let texts: Vec<String> = (0..first.len())
             .map(|k| match self.varying.binary_search(&k) {
                 Ok(number) => format!("c[{number}]"),
-                Err(_) => C.constant(first[k], precision).unwrap_or_default(),
+                Err(_) => match first[k] {
+                    Scalar::Constant(value) => C.constant(value, precision).unwrap_or_default(),
+                    Scalar::Uniform { index, negated: false } => format!("u[{index}]"),
+                    Scalar::Uniform { index, negated: true } => format!("(-u[{index}])"),
+                },
             })
             .collect();
         for body in [Some(&mut self.body), self.mend.as_mut()].into_iter().flatten() {
@@ -148,7 +154,7 @@ fn replaced(text: &str, by: &[String]) -> String {
             .split_once(']')
             .and_then(|(number, rest)| Some((by.get(number.parse::<usize>().ok()?)?, rest)))
         {
-            Some((constant, rest)) => made.extend([constant, rest]),
+            Some((number, rest)) => made.extend([number, rest]),
             None => made.extend(["c[", part]),
         }
     }

@@ -2,7 +2,7 @@
 //!
 //! Folds are thousands of operations in which a dozen repeat. They are put into an order in which every part follows
 //! what it needs, and cut where the fewest results are handed on, which is between one part and the next. Pieces whose
-//! texts are equal but for their constants then share a function.
+//! texts are equal but for their constants and uniforms then share a function.
 
 use std::collections::HashSet;
 use std::hash::{Hash, Hasher};
@@ -131,7 +131,7 @@ impl<'a> Formula<'a> {
     }
 
     /// A hash of what each chunk computes that begins at `start` and ends behind it, up to `last`: of its operations but
-    /// not of its constants.
+    /// not of its constants and uniforms.
     fn patterns(&self, start: usize, last: usize) -> Vec<u64> {
         let mut hasher = FxHasher::default();
         let mut reads = Vec::new();
@@ -153,8 +153,8 @@ impl<'a> Formula<'a> {
     fn pattern(&self, node: Node, start: usize, reads: &mut Vec<Node>, hasher: &mut FxHasher) {
         let expr = self.graph.expr(node);
         match expr {
-            Expr::Constant(_) => (),
-            Expr::Coordinate(_) | Expr::Parameter(_) | Expr::Uniform(_) => expr.hash(hasher),
+            Expr::Constant(_) | Expr::Uniform(_) => (),
+            Expr::Coordinate(_) | Expr::Parameter(_) => expr.hash(hasher),
             Expr::Unary(op, _) => op.hash(hasher),
             Expr::Binary(op, ..) => op.hash(hasher),
             Expr::Lookup(lookup, _) => lookup.hash(hasher),

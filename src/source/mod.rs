@@ -22,7 +22,7 @@
 //! | `c_blocks`, `c_chunks` | long formulas of C in parts |
 //! | `c_folds`, `c_links` | long formulas of C as chains |
 //! | `c_calls`, `c_waves` | loops of C around the functions of the mathematical library, and its own sine and cosine |
-//! | `c_room` | the columns of blocks of points, and the tables of steps over them |
+//! | `c_room`, `c_table` | the columns of blocks of points, and the tables of steps over them |
 //! | `march` | functions for a ray-marcher: sign, gradient and range of ω |
 //! | `object` | object code with its header |
 //! | `names` | which names a file may use |
@@ -39,6 +39,7 @@ mod c_header;
 mod c_linkage;
 mod c_links;
 mod c_room;
+mod c_table;
 mod c_waves;
 mod language;
 mod march;

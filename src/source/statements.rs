@@ -6,7 +6,7 @@ use std::collections::{BTreeSet, HashMap, HashSet};
 use super::language::{Function, Language};
 use super::operations::{Junction, Names, Operation};
 use super::{Math, SourceError};
-use crate::ir::{Axis, Binary, BinaryFunction, Expr, Forms, Graph, Node, R0, Unary, UnaryFunction};
+use crate::ir::{Axis, Binary, BinaryFunction, Expr, Forms, Graph, Node, R0, Scalar, Unary, UnaryFunction};
 use crate::precision::Precision;
 
 /// How a graph is written.
@@ -22,9 +22,9 @@ pub(super) struct Writer<'a> {
     pub parameter: &'a dyn Fn(u32) -> String,
     /// How a uniform is written.
     pub uniform: &'a dyn Fn(u32) -> String,
-    /// Where constants are gathered, to be written as `c[0]`, `c[1]` …, and values are numbered one after the other:
-    /// parts of one shape then have one text.
-    pub gathered: Option<&'a RefCell<Vec<f64>>>,
+    /// Where constants and uniforms are gathered, to be written as `c[0]`, `c[1]` …, and values are numbered one after the
+    /// other: parts of one shape then have one text.
+    pub gathered: Option<&'a RefCell<Vec<Scalar>>>,
     /// What the names of values begin with, so that two graphs may stand in one function.
     pub values: &'a str,
     pub own: Own,
@@ -82,6 +82,13 @@ impl Writer<'_> {
     }
 }
 
+/// Keeps a number, and says how it is written.
+fn gather(gathered: &RefCell<Vec<Scalar>>, number: Scalar) -> String {
+    let mut gathered = gathered.borrow_mut();
+    gathered.push(number);
+    format!("c[{}]", gathered.len() - 1)
+}
+
 /// The pairs of operands whose weights are asked for, the lesser node first.
 fn weighted_pairs(graph: &Graph, needed: &[Node]) -> BTreeSet<(Node, Node, Junction)> {
     let weight = |&node: &Node| match graph.expr(node) {
@@ -132,7 +139,7 @@ impl State<'_> {
             Expr::Coordinate(Axis::Z) => return Ok(writer.axes[2].into()),
             Expr::Coordinate(Axis::T) => return Ok(writer.axes[3].into()),
             Expr::Parameter(i) => return Ok((writer.parameter)(i)),
-            Expr::Uniform(i) => return Ok((writer.uniform)(i)),
+            Expr::Uniform(i) => return Ok(self.uniform(i)),
             Expr::Unary(op, a) => self.unary(op, &self.texts[&a].clone())?,
             Expr::Binary(op, u, v) => {
                 if let Some(r0) = op.r0() {
@@ -163,8 +170,12 @@ impl State<'_> {
     /// A constant of the graph.
     fn given(&self, value: f64) -> Result<String, SourceError> {
         let Some(gathered) = self.writer.gathered else { return self.constant(value) };
-        gathered.borrow_mut().push(value);
-        Ok(format!("c[{}]", gathered.borrow().len() - 1))
+        Ok(gather(gathered, Scalar::Constant(value)))
+    }
+
+    fn uniform(&self, index: u32) -> String {
+        let Some(gathered) = self.writer.gathered else { return (self.writer.uniform)(index) };
+        gather(gathered, Scalar::Uniform { index, negated: false })
     }
 
     /// A constant of an operation.

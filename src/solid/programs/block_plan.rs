@@ -2,7 +2,7 @@
 //!
 //! R₀ is a step of its own, a *junction*; in solids of many leaves so are min and max, and sums, products
 //! and quotients of what junctions give. What is left falls apart into pieces of plain arithmetic, each of which is
-//! compiled into one program. Where many pieces have one shape and differ in their constants alone, they
+//! compiled into one program. Where many pieces have one shape and differ in constants and uniforms alone, they
 //! share a program: ten thousand balls are compiled as one.
 //!
 //! The *stage* of a node is how many junctions lie below it, counted along the path with the most changes
@@ -12,7 +12,7 @@ use rustc_hash::FxHashMap;
 use std::ops::Range;
 
 use super::columns::ColumnPlace;
-use crate::ir::{Binary, Expr, Form, Forms, Graph, Node, R0, Unary};
+use crate::ir::{Binary, Expr, Form, Forms, Graph, Node, R0, Scalar, Unary};
 
 /// Up to this many pieces one program computes them all: it shares what they have in common, such as x² + y².
 const FEW_PIECES: usize = 16;
@@ -24,7 +24,7 @@ const SAME_SHAPE: usize = 4;
 pub enum BlockStep<P = ColumnPlace> {
     Arithmetic {
         program: usize,
-        /// Their place among the plan's constants.
+        /// Their place among the plan's numbers.
         parameters: Range<usize>,
         reads: Vec<P>,
         writes: Vec<P>,
@@ -69,7 +69,8 @@ pub struct BlockPlan {
     pub steps: Vec<BlockStep>,
     /// Columns that must be kept at a time.
     pub columns: usize,
-    pub constants: Vec<f64>,
+    /// The parameters of all steps.
+    pub numbers: Vec<Scalar>,
 }
 
 impl BlockPlan {
@@ -90,11 +91,11 @@ impl BlockPlan {
         }
         let planned = PlannedGraph::new(graph, outputs, &used, many);
         let mut planner =
-            Planner { planned, forms, pieces: Vec::new(), constants: Vec::new(), steps: Vec::new() };
+            Planner { planned, forms, pieces: Vec::new(), numbers: Vec::new(), steps: Vec::new() };
         planner.schedule(outputs);
-        let Planner { pieces, constants, steps, .. } = planner;
+        let Planner { pieces, numbers, steps, .. } = planner;
         let (steps, columns) = allocate(steps, outputs);
-        Some(Self { pieces, steps, columns, constants })
+        Some(Self { pieces, steps, columns, numbers })
     }
 }
 
@@ -124,8 +125,8 @@ fn is_choice(op: Binary) -> bool {
     matches!(op, Binary::Min | Binary::Max | Binary::PlainMin | Binary::PlainMax)
 }
 
-/// A node, and the constants of its cone.
-type Member = (Node, Vec<f64>);
+/// A node, and the numbers of its cone that are parameters of its shape.
+type Member = (Node, Vec<Scalar>);
 
 /// The graph taken apart.
 struct PlannedGraph<'g> {
@@ -137,8 +138,8 @@ struct PlannedGraph<'g> {
     cut: Vec<bool>,
     /// Cut nodes of each stage that one program computes.
     together: Vec<Vec<Node>>,
-    /// Cut nodes that share a program with others: its number, and their constants.
-    shared: FxHashMap<Node, (usize, Vec<f64>)>,
+    /// Cut nodes that share a program with others: its number, and their parameters.
+    shared: FxHashMap<Node, (usize, Vec<Scalar>)>,
     shapes: Vec<Graph>,
 }
 
@@ -177,17 +178,17 @@ impl<'g> PlannedGraph<'g> {
         let mut groups: FxHashMap<Vec<Expr>, usize> = FxHashMap::default();
         let mut members: Vec<(Graph, Vec<Member>)> = Vec::new();
         for &node in &self.together[0] {
-            let (shape, _, constants) = self.graph.parametrised(node);
+            let (shape, _, numbers) = self.graph.parametrised_with_uniforms(node);
             let number = *groups.entry(shape.exprs().to_vec()).or_insert_with(|| {
                 members.push((shape, Vec::new()));
                 members.len() - 1
             });
-            members[number].1.push((node, constants));
+            members[number].1.push((node, numbers));
         }
         for (shape, leaves) in members.into_iter().filter(|(_, leaves)| leaves.len() >= SAME_SHAPE) {
             let number = self.shapes.len();
             self.shapes.push(shape);
-            self.shared.extend(leaves.into_iter().map(|(node, constants)| (node, (number, constants))));
+            self.shared.extend(leaves.into_iter().map(|(node, numbers)| (node, (number, numbers))));
         }
         self.together[0].retain(|node| !self.shared.contains_key(node));
     }
@@ -225,7 +226,7 @@ struct Planner<'g> {
     planned: PlannedGraph<'g>,
     forms: &'g Forms,
     pieces: Vec<Piece>,
-    constants: Vec<f64>,
+    numbers: Vec<Scalar>,
     steps: Vec<BlockStep<Slot>>,
 }
 
@@ -281,10 +282,10 @@ impl Planner<'_> {
                 expr => unreachable!("{expr:?} is no step of its own"),
             };
         }
-        if let Some((program, constants)) = self.planned.shared.get(&node) {
-            let first = self.constants.len();
-            self.constants.extend(constants);
-            let parameters = first..self.constants.len();
+        if let Some((program, numbers)) = self.planned.shared.get(&node) {
+            let first = self.numbers.len();
+            self.numbers.extend(numbers);
+            let parameters = first..self.numbers.len();
             let (reads, writes) = (Vec::new(), vec![Some(node)]);
             self.steps.push(BlockStep::Arithmetic { program: *program, parameters, reads, writes });
             return vec![node];
@@ -491,7 +492,7 @@ mod tests {
         let root = union(&mut graph, &balls);
         let plan = BlockPlan::new(&graph, &[root], &Forms::default()).unwrap();
         assert_eq!(plan.pieces.len(), 1);
-        assert_eq!(plan.constants.len(), 1000 * plan.pieces[0].parameters);
+        assert_eq!(plan.numbers.len(), 1000 * plan.pieces[0].parameters);
         assert_eq!(plan.steps.len(), 1000 + 999);
         // a balanced tree of n leaves has log₂ n partial results
         assert!(plan.columns <= 12, "{}", plan.columns);

@@ -16,7 +16,7 @@ use super::compiled::{SegmentProgram, padded};
 use super::kernels::{Kernel, WeightedKernel};
 use super::number::Number;
 use crate::codegen::{CodegenError, Forms};
-use crate::ir::{Graph, Node};
+use crate::ir::{Graph, Node, Scalar};
 
 /// Columns of a block take this many bytes together, as long as a block has [`SHORTEST`] points: most of a
 /// first-level data cache of 32 KiB.
@@ -36,10 +36,19 @@ const MAX_OUTPUTS: usize = 5;
 pub struct BlockProgram<T> {
     steps: Vec<CompiledStep<T>>,
     pieces: Vec<SegmentProgram<T>>,
+    /// With anything in the place of uniforms.
     parameters: Vec<T>,
+    uniform_parameters: Vec<UniformParameter>,
     columns: usize,
     block: usize,
     outputs: usize,
+}
+
+/// A parameter whose value is a uniform or its negative.
+struct UniformParameter {
+    place: usize,
+    uniform: usize,
+    negated: bool,
 }
 
 /// A step with its code.
@@ -83,11 +92,21 @@ impl<T: Number> BlockProgram<T> {
             SegmentProgram::compile(graph, &piece.inputs, &piece.outputs, piece.parameters)
         };
         let pieces = plan.pieces.iter().map(piece).collect::<Result<_, _>>()?;
-        let parameters = plan.constants.into_iter().map(T::from_f64).collect();
+        let mut uniform_parameters = Vec::new();
+        let parameters = (0..)
+            .zip(plan.numbers)
+            .map(|(place, number)| match number {
+                Scalar::Constant(value) => T::from_f64(value),
+                Scalar::Uniform { index, negated } => {
+                    uniform_parameters.push(UniformParameter { place, uniform: index as usize, negated });
+                    T::default()
+                }
+            })
+            .collect();
         let fitting = CACHED_BYTES / (size_of::<T>() * plan.columns.max(1));
         let block = (fitting / SHORTEST * SHORTEST).clamp(SHORTEST, LONGEST);
         let (columns, outputs) = (plan.columns, outputs.len());
-        Ok(Some(Self { steps, pieces, parameters, columns, block, outputs }))
+        Ok(Some(Self { steps, pieces, parameters, uniform_parameters, columns, block, outputs }))
     }
 
     /// All outputs at many points, which may be any number.
@@ -105,7 +124,7 @@ impl<T: Number> BlockProgram<T> {
         );
         let whole = count / PADDING * PADDING;
         T::with_scratch(|scratch| {
-            self.make_room(scratch);
+            self.prepare(uniforms, scratch);
             for at in (0..whole).step_by(self.block) {
                 let range = at..(at + self.block).min(whole);
                 let mut outputs = out.each_mut().map(|column| &mut column[range.clone()]);
@@ -133,7 +152,7 @@ impl<T: Number> BlockProgram<T> {
         let mut results = [[T::default(); PADDING]; MAX_OUTPUTS];
         let mut outputs = results.each_mut().map(<[T; PADDING]>::as_mut_slice);
         T::with_scratch(|scratch| {
-            self.make_room(scratch);
+            self.prepare(uniforms, scratch);
             let outputs = &mut outputs[..out.len()];
             self.block(inputs.each_ref().map(<[T; PADDING]>::as_slice), uniforms, outputs, scratch);
         });
@@ -142,22 +161,31 @@ impl<T: Number> BlockProgram<T> {
         }
     }
 
-    /// Enlarges the columns if need be. They never shrink, because programs of different sizes take turns.
-    fn make_room(&self, scratch: &mut Scratch<T>) {
+    /// Fills in the parameters that are uniforms, and enlarges the columns if need be. They never shrink, because programs
+    /// of different sizes take turns.
+    fn prepare(&self, uniforms: &[T], scratch: &mut Scratch<T>) {
         let needed = self.columns * self.block;
         if scratch.columns.len() < needed {
             scratch.columns.resize(needed, T::default());
         }
+        if !self.uniform_parameters.is_empty() {
+            scratch.parameters.clear();
+            scratch.parameters.extend_from_slice(&self.parameters);
+            for &UniformParameter { place, uniform, negated } in &self.uniform_parameters {
+                let value = uniforms[uniform];
+                scratch.parameters[place] = if negated { -value } else { value };
+            }
+        }
     }
 
     fn block(&self, points: [&[T]; 3], uniforms: &[T], outputs: &mut [&mut [T]], scratch: &mut Scratch<T>) {
-        let Scratch { columns, pointers } = scratch;
+        let Scratch { columns, pointers, parameters: filled } = scratch;
+        let parameters = if self.uniform_parameters.is_empty() { &self.parameters } else { &*filled };
         let mut frame = Frame { points, outputs, uniforms, columns, stride: self.block, pointers };
         for step in &self.steps {
             match step {
-                CompiledStep::Arithmetic { piece, parameters, reads, writes } => {
-                    let parameters = &self.parameters[parameters.clone()];
-                    self.pieces[*piece].call(&mut frame, reads, writes, parameters);
+                CompiledStep::Arithmetic { piece, parameters: range, reads, writes } => {
+                    self.pieces[*piece].call(&mut frame, reads, writes, &parameters[range.clone()]);
                 }
                 CompiledStep::Junction { kernel, operands, value } => {
                     frame.junction(*kernel, *operands, *value)

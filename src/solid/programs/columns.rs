@@ -18,6 +18,8 @@ pub enum ColumnPlace {
 pub struct Scratch<T> {
     pub columns: Vec<T>,
     pub pointers: Vec<*mut T>,
+    /// The parameters of a program whose parts take uniforms as such.
+    pub parameters: Vec<T>,
 }
 
 /// The columns of one block: the caller's, and those that steps hand on.
