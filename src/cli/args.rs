@@ -12,8 +12,8 @@ use super::shared::Shared;
 use super::sweep::options::{Again, SweepOptions};
 pub(super) use super::values::{CameraFlag, CutFlag};
 use super::values::{
-    Deny, Frames, Tolerance, aabb, camera, cut, deny, frames, length, plane, point, seconds, tolerance,
-    window,
+    Deny, Frames, Tolerance, aabb, camera, cut, deny, frames, length, plane, point, seconds, steps,
+    tolerance, window,
 };
 use glam::DVec3;
 use rfm::geom::Aabb;
@@ -384,7 +384,7 @@ pub(super) struct Run {
     #[arg(short, long, value_name = "DIR")]
     pub output: Option<PathBuf>,
     /// Stop after this many steps, counted from the run's beginning, whatever the scene says of the end
-    #[arg(long, value_name = "N", conflicts_with = "until", allow_negative_numbers = true)]
+    #[arg(long, value_name = "N", conflicts_with = "until", value_parser = steps, allow_negative_numbers = true)]
     pub steps: Option<u64>,
     /// Stop at this simulated time, in seconds or with a unit: 500ms
     #[arg(long, value_name = "TIME", value_parser = seconds, allow_negative_numbers = true)]

@@ -119,6 +119,11 @@ pub(super) fn seconds(text: &str) -> Result<f64, String> {
     if value.is_finite() { Ok(value) } else { Err("the time must be finite".into()) }
 }
 
+/// A number of steps.
+pub(super) fn steps(text: &str) -> Result<u64, String> {
+    text.trim().parse().map_err(|_| "a whole number that is not negative, as in 100".to_string())
+}
+
 /// A number of metres, or a length with a unit.
 pub(super) fn length(text: &str) -> Result<f64, String> {
     measured(text, Dimension::LENGTH, "a length", "0.5, 8mm or 2cm")

@@ -307,6 +307,27 @@ impl Lowering<'_> {
         self.report(Diagnostic::warning(Code::LARGE_ANGLE, at.span, message).help(help));
     }
 
+    /// Warns of a number beyond all angles that a function gives, as in `atan2(y, x) <= 45`.
+    pub fn warn_of_angle_out_of_range(&mut self, operands: &[&Expr]) {
+        let function = |operand: &&Expr| match &operand.kind {
+            ExprKind::Call { function, .. } if GIVE_ANGLES.contains(&function.text.as_str()) => {
+                Some(function.text.clone())
+            }
+            _ => None,
+        };
+        let Some(function) = operands.iter().find_map(function) else { return };
+        for operand in operands {
+            let ExprKind::Number(number) = without_sign(operand).kind else { continue };
+            if number <= std::f64::consts::PI || operand.span.source != SourceId::File {
+                continue;
+            }
+            let written = self.written(operand).unwrap_or("…").to_string();
+            let message = format!("no angle of `{function}` reaches {number} rad: they lie between -π and π");
+            let help = format!("are degrees meant? write `{}`", with_unit(&written, "deg"));
+            self.report(Diagnostic::warning(Code::LARGE_ANGLE, operand.span, message).help(help));
+        }
+    }
+
     /// Warns of a number of turns that is usual in degrees, as in `.twist(90)`.
     pub fn warn_of_turns_in_degrees(&mut self, expr: &Expr) {
         let ExprKind::Number(number) = without_sign(expr).kind else { return };
@@ -446,6 +467,9 @@ pub(super) fn names_a_coordinate(expr: &Expr) -> bool {
 fn without_sign(expr: &Expr) -> &Expr {
     if let ExprKind::Negate(inner) = &expr.kind { inner } else { expr }
 }
+
+/// Functions that give angles.
+const GIVE_ANGLES: [&str; 4] = ["atan2", "atan", "asin", "acos"];
 
 /// Numbers that angles in degrees usually have.
 const USUAL_IN_DEGREES: [f64; 9] = [30.0, 45.0, 60.0, 72.0, 90.0, 120.0, 180.0, 270.0, 360.0];

@@ -321,6 +321,24 @@ pub fn key(word: &str) -> Option<&'static str> {
     })
 }
 
+/// The value of a key that is nearest to one of other solvers, and why; `None` if none is known.
+pub fn value(key: &str, word: &str) -> Option<(&'static str, &'static str)> {
+    Some(match word {
+        _ if key != "method" => return None,
+        "pcisph" | "iisph" | "pbf" | "isph" | "pbd" | "icsph" => ("dfsph", "it solves for the pressure"),
+        "sph"
+        | "delta_sph"
+        | "deltasph"
+        | "dsph"
+        | "tait"
+        | "weakly_compressible"
+        | "wc_sph"
+        | "tvf"
+        | "edac" => ("wcsph", "it takes the pressure from the density"),
+        _ => return None,
+    })
+}
+
 /// A number that GLSL or C writes with a letter behind it, as `1.5f`.
 pub fn is_letter_of_type(word: &str) -> bool {
     ["f", "F", "u", "U", "lf", "LF"].contains(&word)

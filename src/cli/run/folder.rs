@@ -54,6 +54,9 @@ pub(super) fn was_held(folder: &Path) -> bool {
 /// Refuses a folder that holds a sweep, a run which is neither to be replaced nor to be continued, or files
 /// of others that the run of a scene would replace.
 pub(super) fn may_be_written(folder: &Path, options: &Run, scene: &Scene) -> Result<(), Failure> {
+    if folder == Path::new("-") {
+        return Err(Failure::usage("a run writes a folder, and nothing to standard output: give -o DIR"));
+    }
     if holds_a_sweep(folder) {
         return Err(Failure::usage(format!(
             "`{}` holds a sweep: write the run elsewhere with -o DIR",

@@ -345,10 +345,13 @@ impl<'a> Lowering<'a> {
         let index = words.iter().position(|word| *word == found);
         if index.is_none() {
             let diagnostic =
-                Diagnostic::error(Code::SCENE_KEY, value.span, format!("unknown value of `{key}`"))
+                Diagnostic::error(Code::SCENE_KEY, value.span, format!("unknown value of `{key}`"));
+            self.report(match foreign::value(key, found) {
+                Some((ours, why)) => diagnostic.help(format!("write `{ours}`: {why}")),
+                None => diagnostic
                     .help(format!("this version knows {}", words.join(", ")))
-                    .suggest(found, words.iter().copied());
-            self.report(diagnostic);
+                    .suggest(found, words.iter().copied()),
+            });
         }
         index.map(Some)
     }

@@ -2,11 +2,15 @@
 
 use super::super::foreign;
 use super::super::words::ITEM_WORDS;
-use super::{Slip, bracketed, fits, last_word, parts, unclosed};
+use super::ranges::members;
+use super::{Slip, bracketed, fits, last_number, last_word, parts, unclosed};
 use crate::diagnostic::{Code, Diagnostic, Span};
 
 /// What begins a fold.
 pub(super) const FOLDS: [&str; 6] = ["any", "all", "sum", "product", "min", "max"];
+
+/// Functions whose powers mathematics writes behind their names.
+const POWERS_OF: [&str; 9] = ["sin", "cos", "tan", "sinh", "cosh", "tanh", "log", "ln", "exp"];
 
 impl Slip<'_> {
     /// A mark that stands where the head of something is written otherwise.
@@ -20,7 +24,8 @@ impl Slip<'_> {
                 .fold_as_a_call()
                 .or_else(|| self.fold_of_three())
                 .or_else(|| self.function_by_let())
-                .or_else(|| self.obstacle_by_a_shape()),
+                .or_else(|| self.obstacle_by_a_shape())
+                .or_else(|| self.power_of_a_function()),
             "[" => self.range_in_brackets(),
             ":" => self
                 .type_of_a_param()
@@ -155,10 +160,25 @@ impl Slip<'_> {
                 (head.trim(), body[1..].trim())
             }
         };
-        let is_fold = FOLDS.contains(&fold) && head.contains(" in ") && fits(&[head]);
-        is_fold.then(|| {
-            let body = if fits(&[body]) { body } else { "…" };
-            self.unexpected().help(format!("a fold has no brackets: write `{fold} {head}: {body}`"))
+        let (variable, range) = head.split_once(" in ").filter(|_| FOLDS.contains(&fold) && fits(&[head]))?;
+        let range = members(range.trim()).unwrap_or_else(|| range.trim().to_string());
+        let body = if fits(&[body]) { body } else { "…" };
+        Some(
+            self.unexpected()
+                .help(format!("a fold has no brackets: write `{fold} {variable} in {range}: {body}`")),
+        )
+    }
+
+    /// `sin^2(x)`
+    fn power_of_a_function(&self) -> Option<Diagnostic> {
+        let before = self.before();
+        let exponent = last_number(before);
+        let function = last_word(before.strip_suffix(exponent)?.strip_suffix('^')?);
+        let argument = bracketed(&self.text[self.at..])?.trim();
+        let is_one = |part: &str| fits(&[part]) && !part.is_empty();
+        (POWERS_OF.contains(&function) && !exponent.is_empty() && is_one(argument)).then(|| {
+            let written = format!("{function}({argument})^{exponent}");
+            self.unexpected().at("a power stands behind the call").help(format!("write `{written}`"))
         })
     }
 

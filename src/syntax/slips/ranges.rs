@@ -314,7 +314,7 @@ pub(super) fn replaced(formula: &str, name: &str, value: &str) -> String {
 }
 
 /// The members of a fold as they are written here: `0..5` and `[1, 2]` stay, and `range(5)` is `0..5`.
-fn members(range: &str) -> Option<String> {
+pub(super) fn members(range: &str) -> Option<String> {
     if let Some(arguments) = range.strip_prefix("range").and_then(bracketed) {
         return match parts(arguments)[..] {
             [end] => Some(format!("0..{end}")),

@@ -46,6 +46,8 @@ const COMMANDS: &[(&[&str], i32)] = &[
     (&["mesh", "post.rfm", "-s", "nothing", "--json"], 1),
     (&["run", "post.rfm", "--until", "5 kg"], 2),
     (&["run", "post.rfm", "--until", "soon"], 2),
+    (&["run", "post.rfm", "--steps", "-5"], 2),
+    (&["run", "post.rfm", "--steps", "1", "-o", "-"], 2),
     (&["run", "post.rfm", "--camera", "0,0,0"], 2),
     (&["run", "post.rfm", "--camera", "above"], 2),
     (&["run", "post.rfm", "--cut", "0.5"], 2),

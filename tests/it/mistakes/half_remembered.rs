@@ -63,6 +63,10 @@ const TEXTS: &[&str] = &[
     "param r: float\nsolid s = sphere(r)",
     "let i = 1\nparam r = 2 * i in [0.5, 2]\nsolid s = sphere(r)",
     "solid s = any r in 0..5 step 2: sphere(r=0.1).move([r, 0, 0])",
+    "solid s = any(sphere(0.3).move([i, 0, 0]) for i in range(3))",
+    "solid s = any(sphere(0.3).move([i, 0, 0]) for i in range(1, 3))",
+    "solid s = sin^2(x) + y^2 + z^2 <= 1 and box()",
+    "solid s = sphere(1) and atan2(y, x) <= 45",
 ];
 
 #[test]

@@ -52,6 +52,7 @@ const SCENES: &[&str] = &[
     "obstacle: post",
     "fluid: water",
     "method: sph",
+    "method: pcisph",
     "run { dt: 10 }",
     "run { until: 1 s, save_every: 2 s }",
     "run { until: 1 s, save_every: 1e-9 s }",
