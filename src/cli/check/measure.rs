@@ -74,12 +74,7 @@ pub(super) fn measure(
     let of_choices = (solid.may_choose() && knows_ranges(solid, grid.bounds())).then(by_lines).flatten();
     let thin = thin_cells(solid, &*surface, &grid, watch, notes);
     tell_of_end(solid, thin, &mut facts, notes);
-    if let (Some(solids), Some(coarser)) = (facts.components, facts.components_coarser) {
-        // what is left out at the edge of a wedge is within the errors
-        let no_thin_parts = thin.is_some_and(|thin| thin.count == 0 || thin.is_wedge);
-        let is_known = solids != coarser || !no_thin_parts || thin.is_some_and(|thin| !thin.ended);
-        facts.resolved = is_known.then_some(solids == coarser && no_thin_parts);
-    }
+    facts.resolved = resolved(thin, &facts);
     // of a plate that lies between the nodes nothing is seen, but the search may have found it
     let is_hidden =
         by_meshes == ByMeshes::ShowNothing && thin.is_some_and(|thin| thin.count > 0 && !thin.ended);
@@ -87,11 +82,10 @@ pub(super) fn measure(
     let hides_parts = facts.resolved != Some(true) && thin.is_some_and(|thin| thin.count > 0);
     let shows_nothing = by_meshes == ByMeshes::ShowNothing && thin.is_some();
     let lines = of_choices.or_else(|| (hides_parts || shows_nothing).then(by_lines).flatten());
-    if let Some(found) = &lines {
-        match hides_parts || !agree(found, &facts) {
-            true => take_by_lines(found, bounds, &mut facts),
-            false => trust_no_more_than(found, &mut facts),
-        }
+    match &lines {
+        Some(found) if hides_parts || !agree(found, &facts) => take_by_lines(found, bounds, &mut facts),
+        Some(found) => trust_no_more_than(found, &mut facts),
+        None => {}
     }
     if let Some(thin) = thin.filter(|_| facts.resolved == Some(false) || is_hidden) {
         refine((solid, &*surface, bounds), (&grid, thin), lines.as_ref(), watch, (&mut facts, notes));
@@ -104,6 +98,15 @@ pub(super) fn measure(
     facts.shows_nothing =
         shows_nothing && lines.is_none() && thin.is_some_and(|thin| thin.count == 0 && !thin.ended);
     Ok((facts, thin.unwrap_or(ThinCells::NONE)))
+}
+
+/// Whether the meshes show all parts; `None` where that is not known.
+fn resolved(thin: Option<ThinCells>, facts: &Facts) -> Option<bool> {
+    let (solids, coarser) = (facts.components?, facts.components_coarser?);
+    // what is left out at the edge of a wedge is within the errors
+    let no_thin_parts = thin.is_some_and(|thin| thin.count == 0 || thin.is_wedge);
+    let is_known = solids != coarser || !no_thin_parts || thin.is_some_and(|thin| !thin.ended);
+    is_known.then_some(solids == coarser && no_thin_parts)
 }
 
 /// What is known of a solid that is empty.
