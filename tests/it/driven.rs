@@ -372,7 +372,7 @@ solid b = sphere(0.15 + 0.1*clamp(2*t, 0, 1)).move([0.5, 0.5, 0.35])
 scene s {
   box { max: [1, 1, 0.9] }
   obstacle { solid: b }
-  fluid water { shape: box([0, 0, 0], [1, 1, 0.7]) \\ b, density: 1000, particles: 3500, start: hydrostatic }
+  fluid water { shape: box([0, 0, 0], [1, 1, 0.7]) \\ b, density: 1000, particles: 1750, start: hydrostatic }
   method: wcsph
   run { until: 1 s }
 }";
@@ -413,14 +413,14 @@ scene s {
     let probe = rfm::sph::Probe::Force { obstacle: 0, about: DVec3::ZERO };
     let mut gauge = simulation.gauge(probe).unwrap();
     let (mut sum, mut square) = (0.0, 0.0);
-    for k in 1..=200 {
-        let time = 0.2 + 0.001 * f64::from(k);
+    for k in 1..=100 {
+        let time = 0.2 + 0.002 * f64::from(k);
         simulation.advance(time, |_| std::ops::ControlFlow::Continue(())).unwrap();
         let force = simulation.sample(&mut gauge)[0];
         // the mean since the last sample
         let acceleration = 0.01
             * (10.0 * std::f64::consts::PI).powi(2)
-            * (10.0 * std::f64::consts::PI * (time - 0.0005)).cos();
+            * (10.0 * std::f64::consts::PI * (time - 0.001)).cos();
         sum -= force * acceleration;
         square += acceleration * acceleration;
     }

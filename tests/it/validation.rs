@@ -114,7 +114,7 @@ fn water_over_a_pawn_stays_out_of_it() {
 #[test]
 fn a_splash_makes_no_energy_and_keeps_its_volume() {
     for method in ["wcsph", "dfsph"] {
-        let simulation = advanced("closed_tank", method, &[("particles", 1000.0)], 4.0);
+        let simulation = advanced("closed_tank", method, &[("particles", 1000.0)], 2.5);
         let audit = simulation.audit();
         let (energy, volume, speed) =
             (audit.energy_excess().unwrap(), audit.volume_change(), audit.max_speed());

@@ -69,7 +69,7 @@ fn a_drop_swings_in_a_trap_without_loss() {
             "rfm 1
 scene trap {{
   box {{ min: [-1, -1, -1], max: [1, 1, 1] }}
-  fluid water {{ shape: ball([0.3, 0, 0], 0.2), density: 1000, particles: 500 }}
+  fluid water {{ shape: ball([0.3, 0, 0], 0.2), density: 1000, particles: 300 }}
   gravity: [-40*x, -40*y, -40*z]
   method: {method}
   run {{ until: 3 s, save_every: 0.5 s }}
@@ -187,7 +187,7 @@ scene still {{
   run {{ until: 1 s, save_every: 0.5 s }}
 }}"
             ));
-            run_to(&mut simulation, 0.6);
+            run_to(&mut simulation, 0.4);
             let velocity = &simulation.particles().velocity;
             let squares = velocity.iter().map(|v| v.length_squared()).sum::<f64>();
             let speed = (squares / velocity.iter().count() as f64).sqrt();

@@ -70,7 +70,7 @@ scene s {{
   fluid oil {{ shape: pipe, spacing: 0.07, density: 1000, viscosity: 100 }}
   gravity: [-3*y/r, 3*x/r, 0]
   method: {method}
-  run {{ until: 0.6 s, save_every: 0.1 s }}
+  run {{ until: 0.4 s, save_every: 0.1 s }}
 }}"
         ));
         run_to(&mut simulation, 0.6);

@@ -77,7 +77,7 @@ fn work_does_not_depend_on_whether_forces_are_asked_for() {
             for probe in &experiment.scene().probes {
                 simulation.gauge(probe.measured).unwrap();
             }
-            simulation.advance(0.6, |_| ControlFlow::Continue(())).unwrap();
+            simulation.advance(0.4, |_| ControlFlow::Continue(())).unwrap();
             let audit = simulation.audit();
             audit.wall_work().unwrap()
         });
@@ -181,7 +181,7 @@ scene work {
 }"
             .replace("METHOD", method),
         );
-        simulation.advance(5.0, |_| ControlFlow::Continue(())).unwrap();
+        simulation.advance(3.2, |_| ControlFlow::Continue(())).unwrap();
         let audit = simulation.audit();
         println!("{method}: {:?} J, {:?}", audit.wall_work(), audit.energy_excess());
         assert_eq!(simulation.findings(), [], "{method}");
