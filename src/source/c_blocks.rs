@@ -104,7 +104,7 @@ impl Blocks {
         }
         let Written { mut made, called, table, .. } = written;
         let length = made.lines.len();
-        table.write(name, &called, &self.room, &mut made.lines);
+        table.write(name, &called, self.room.kind(), &mut made.lines);
         Ok(Long { made, length, room: self.room, table })
     }
 

@@ -82,7 +82,7 @@ impl Folds {
         }
         let length = made.lines.len();
         let table = Table { numbers, steps: table };
-        table.write(name, &called, &self.room, &mut made.lines);
+        table.write(name, &called, self.room.kind(), &mut made.lines);
         Ok(Long { made, length, room: self.room, table })
     }
 

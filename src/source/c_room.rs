@@ -1,13 +1,10 @@
 //! The room of one block of points, and the functions that walk through columns in blocks.
 
-use super::c_table::{NumbersOfCall, Table};
+use super::c_table::{CACHED_BYTES, NumbersOfCall, Table, size};
 use super::language::C;
 use super::program::Question;
 use super::statements::Statements;
 use crate::precision::Precision;
-
-/// Greatest count of bytes that a block keeps at a time, over all its points: most of a first-level cache.
-pub(super) const CACHED_BYTES: usize = 24 << 10;
 
 /// Least and greatest number of points of a block.
 const SHORTEST: usize = 32;
@@ -23,7 +20,7 @@ pub(super) struct Room {
     /// Points of a block.
     points: usize,
     /// Whether the functions take what depends on time and params alone.
-    pub has_uniforms: bool,
+    has_uniforms: bool,
 }
 
 /// A long formula as functions and tables.
@@ -40,6 +37,11 @@ impl Room {
         let fitting = CACHED_BYTES / (size(precision) * columns.max(1));
         let points = (fitting / SHORTEST * SHORTEST).clamp(SHORTEST, LONGEST);
         Self { precision, columns, points, has_uniforms }
+    }
+
+    /// The precision, and whether there are uniforms.
+    pub fn kind(&self) -> (Precision, bool) {
+        (self.precision, self.has_uniforms)
     }
 
     /// A function that computes statements for the points of a block, and those of `mend` where the first result is NaN.
@@ -168,13 +170,5 @@ impl Room {
 
     fn uniforms_argument(&self) -> &'static str {
         if self.has_uniforms { ", u" } else { "" }
-    }
-}
-
-/// Bytes of a number.
-pub(super) fn size(precision: Precision) -> usize {
-    match precision {
-        Precision::F64 => 8,
-        Precision::F32 => 4,
     }
 }

@@ -3,10 +3,12 @@
 //! A step is the number of a function with its columns; steps of one function may differ in numbers, which stand in a
 //! table of their own. Those that time and params decide are filled in at each call.
 
-use super::c_room::{CACHED_BYTES, Room, size};
 use super::language::C;
 use crate::ir::Scalar;
 use crate::precision::Precision;
+
+/// Greatest count of bytes that a block keeps at a time, over all its points: most of a first-level cache.
+pub(super) const CACHED_BYTES: usize = 24 << 10;
 
 /// A function that steps call.
 pub(super) struct Called {
@@ -32,13 +34,19 @@ impl Table {
         self.numbers.iter().any(|number| matches!(number, Scalar::Uniform { .. }))
     }
 
-    /// The numbers, the steps, and the function that takes them.
-    pub fn write(&self, name: &str, called: &[Called], room: &Room, lines: &mut Vec<String>) {
-        let number = C.number(room.precision);
+    /// The numbers, the steps, and the function that takes them, with uniforms as an argument where there are any.
+    pub fn write(
+        &self,
+        name: &str,
+        called: &[Called],
+        (precision, has_uniforms): (Precision, bool),
+        lines: &mut Vec<String>,
+    ) {
+        let number = C.number(precision);
         if !self.numbers.is_empty() {
             let constant = |scalar: &Scalar| match scalar {
-                Scalar::Constant(value) => C.constant(*value, room.precision),
-                Scalar::Uniform { .. } => C.constant(0.0, room.precision),
+                Scalar::Constant(value) => C.constant(*value, precision),
+                Scalar::Uniform { .. } => C.constant(0.0, precision),
             };
             let constants: Vec<String> = self.numbers.iter().filter_map(constant).collect();
             lines.push(String::new());
@@ -54,7 +62,7 @@ impl Table {
         lines.push(format!("static const int {name}_steps[{}] = {{", numbers.len()));
         lines.extend(numbers.chunks(20).map(|row| format!("    {},", row.join(", "))));
         lines.push("};".into());
-        self.write_run(name, called, room, lines);
+        self.write_run(name, called, (number, has_uniforms), lines);
     }
 
     /// The function that gives all numbers with the uniforms among them. A negative uniform k is written as −1 − k.
@@ -81,10 +89,15 @@ impl Table {
     }
 
     /// The function that takes the steps for one block of points. Columns of the caller are −1, −2 …
-    fn write_run(&self, name: &str, called: &[Called], room: &Room, lines: &mut Vec<String>) {
-        let number = C.number(room.precision);
+    fn write_run(
+        &self,
+        name: &str,
+        called: &[Called],
+        (number, has_uniforms): (&str, bool),
+        lines: &mut Vec<String>,
+    ) {
         let mut given = String::new();
-        given.extend(room.has_uniforms.then(|| format!(", const {number} *u")));
+        given.extend(has_uniforms.then(|| format!(", const {number} *u")));
         given.extend(self.is_filled().then(|| format!(", const {number} *c")));
         let numbers = if self.is_filled() { "c".into() } else { format!("{name}_constants") };
         lines.push(String::new());
@@ -103,7 +116,7 @@ impl Table {
             let mut arguments = vec!["n".to_string()];
             if function.is_piece {
                 arguments.extend(["x", "y", "z"].map(String::from));
-                arguments.extend(room.has_uniforms.then(|| "u".to_string()));
+                arguments.extend(has_uniforms.then(|| "u".to_string()));
             }
             arguments.extend(function.has_numbers.then(|| format!("{numbers} + s[0]")));
             let first = usize::from(function.has_numbers);
@@ -147,4 +160,12 @@ pub(super) struct NumbersOfCall {
     /// How the numbers are given.
     pub argument: &'static str,
     pub after: Vec<String>,
+}
+
+/// Bytes of a number.
+pub(super) fn size(precision: Precision) -> usize {
+    match precision {
+        Precision::F64 => 8,
+        Precision::F32 => 4,
+    }
 }

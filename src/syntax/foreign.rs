@@ -325,7 +325,7 @@ pub fn key(word: &str) -> Option<&'static str> {
 pub fn value(key: &str, word: &str) -> Option<(&'static str, &'static str)> {
     Some(match word {
         _ if key != "method" => return None,
-        "pcisph" | "iisph" | "pbf" | "isph" | "pbd" | "icsph" => ("dfsph", "it solves for the pressure"),
+        "pcisph" | "iisph" | "pbf" | "isph" | "pbd" | "icsph" => ("dfsph", "which solves for the pressure"),
         "sph"
         | "delta_sph"
         | "deltasph"
@@ -334,7 +334,7 @@ pub fn value(key: &str, word: &str) -> Option<(&'static str, &'static str)> {
         | "weakly_compressible"
         | "wc_sph"
         | "tvf"
-        | "edac" => ("wcsph", "it takes the pressure from the density"),
+        | "edac" => ("wcsph", "which takes the pressure from the density"),
         _ => return None,
     })
 }

@@ -347,7 +347,7 @@ impl<'a> Lowering<'a> {
             let diagnostic =
                 Diagnostic::error(Code::SCENE_KEY, value.span, format!("unknown value of `{key}`"));
             self.report(match foreign::value(key, found) {
-                Some((ours, why)) => diagnostic.help(format!("write `{ours}`: {why}")),
+                Some((ours, why)) => diagnostic.help(format!("write `{key}: {ours}`, {why}")),
                 None => diagnostic
                     .help(format!("this version knows {}", words.join(", ")))
                     .suggest(found, words.iter().copied()),
