@@ -12,7 +12,7 @@ use glam::DVec3;
 
 use super::bounds::contraction::Tree;
 use super::bounds::queue::Queued;
-use super::bounds::search::{Effort, NODES_PER_WORK, SEARCH_RADIUS, Shrink};
+use super::bounds::search::{Effort, NODES_PER_WORK, SEARCH_RADIUS, Shrink, halves};
 use super::bounds::whole::WholeFormula;
 use super::construction::Solid;
 use super::leaves::words;
@@ -57,6 +57,15 @@ const MOST_WORK: usize = 100_000;
 
 /// Operations of machine code that take as long as a node of a formula whose range is found.
 const OPERATIONS_OF_NODE: usize = 8;
+
+/// Length of the first ray where nothing is known of the distance, m.
+const SHORTEST_RAY: f64 = 1e-6;
+
+/// Directions that are tried where neither the normal nor an axis meets the surface.
+const ALL_AROUND: u32 = 64;
+
+/// The turn from one direction to the next, so that they are evenly spread: π (3 − √5).
+const GOLDEN_ANGLE: f64 = 2.399_963_229_728_653;
 
 /// Number of times that the length of a ray is doubled.
 const DOUBLINGS: i32 = 60;
@@ -148,6 +157,9 @@ impl Distances {
             work: Cell::new(MOST_WORK),
         };
         self.rays(&mut best);
+        if !best.distance.is_finite() {
+            self.rays_all_around(&mut best);
+        }
         best.turn();
         // nothing is proven beyond the box that is searched
         let reach = best.distance.min(2.0 * SEARCH_RADIUS);
@@ -174,7 +186,7 @@ impl Distances {
             if best.distance < before * (1.0 - GAP) {
                 best.turn();
             }
-            for mut half in space.halves() {
+            for mut half in halves(&space, p) {
                 let Some((known, beyond)) = target.shrink_from(&known, &mut half, p) else { continue };
                 let distance = distance_to(&half, p).max(beyond);
                 if distance < best.distance {
@@ -189,12 +201,31 @@ impl Distances {
     fn rays(&self, best: &mut Best<'_>) {
         let contact = self.solid.estimated_contact(best.p);
         let guess = contact.distance.abs();
-        let first = if guess.is_finite() && guess > 0.0 { 1.0001 * guess } else { 1e-6 };
+        let first = if guess.is_finite() && guess > 0.0 { 1.0001 * guess } else { SHORTEST_RAY };
         let normal = contact.normal * best.sign;
         let directions = [normal, DVec3::X, DVec3::Y, DVec3::Z, -DVec3::X, -DVec3::Y, -DVec3::Z];
+        Self::longer_rays(best, first, &directions);
+    }
+
+    /// Looks for the surface in all directions. (A solid such as xy ≤ −1 has neither a point on the axes nor, seen from
+    /// the middle, a normal, and it has no end, so that cells of all space would have to find it.)
+    fn rays_all_around(&self, best: &mut Best<'_>) {
+        // evenly spread along a spiral from pole to pole, none of them along an axis or a diagonal
+        let direction = |k: u32| {
+            let height = 1.0 - (2.0 * f64::from(k) + 1.0) / f64::from(ALL_AROUND);
+            let (sin, cos) = (GOLDEN_ANGLE * f64::from(k) + 0.3).sin_cos();
+            let radius = (1.0 - height * height).sqrt();
+            DVec3::new(radius * cos, radius * sin, height)
+        };
+        let directions: Vec<DVec3> = (0..ALL_AROUND).map(direction).collect();
+        Self::longer_rays(best, SHORTEST_RAY, &directions);
+    }
+
+    /// Tries rays, each time twice as long, until one of them meets the surface.
+    fn longer_rays(best: &mut Best<'_>, first: f64, directions: &[DVec3]) {
         for doubling in 0..DOUBLINGS {
             let reach = first * f64::exp2(f64::from(doubling));
-            for direction in directions {
+            for &direction in directions {
                 if direction.is_finite() && direction != DVec3::ZERO {
                     best.try_ray(best.p + reach * direction);
                 }

@@ -44,6 +44,50 @@ fn axes_and_medial_surfaces_have_distances() {
     check("box() and sphere(0.2, [5, 0, 0]) or box([3, 0, 0], [4, 1, 1])", [0.0, 0.5, 0.5], 3.0);
 }
 
+/// From these points no ray along an axis meets the solid, ω has no slope, and the solid has no end.
+#[test]
+fn solids_without_end_are_found_where_nothing_leads_to_them() {
+    let [two, three] = [2_f64.sqrt(), 3_f64.sqrt()];
+    check("x*y <= -1", [0.0, 0.0, 0.0], two);
+    check("x*y <= -1", [0.0, 0.0, 1e6], two);
+    check("x*y <= -1e6", [0.0, 0.0, 0.0], 1e3 * two);
+    check("x*y <= -1e-6", [0.0, 0.0, 0.0], 1e-3 * two);
+    check("x*y <= -1 or sphere(1, [1e10, 0, 0])", [0.0, 0.0, 0.0], two);
+    check("x*y*z <= -1", [0.0, 0.0, 0.0], three);
+    check("x*y*z <= -1 and x*y >= 1", [0.0, 0.0, 0.0], three);
+    check("x*y*(x - y)*(x + y) <= -1", [0.0, 0.0, 0.0], two);
+}
+
+/// The clearance is compared with the nearest of many points that are inside.
+#[test]
+fn clearances_in_the_middle_are_a_good_part_of_the_distance() {
+    for text in [
+        "x*y <= -1",
+        "(x - z)*(y + 2*z) <= -1",
+        "x^2 + y^2 >= 1",
+        "torus(0.9, 0.2)",
+        "x^2 + y^2 - z^2 >= 1",
+        "x^2 + y^2 - z^2 <= -1",
+        "sphere(1, [1, 1.5, 2]) or sphere(1, [-1, -1.5, -2])",
+        "sphere(1, [2, 0, 0]) or sphere(1, [-2, 0, 0])",
+    ] {
+        let solid = solid(text);
+        let clearance = solid.distance(DVec3::ZERO).clearance;
+        let mut nearest = f64::INFINITY;
+        let steps = || (-60..=60).map(|i| 0.05 * f64::from(i));
+        for p in steps().flat_map(|x| steps().flat_map(move |y| steps().map(move |z| DVec3::new(x, y, z)))) {
+            if p.length() < nearest && solid.sign(p) >= 0.0 {
+                nearest = p.length();
+            }
+        }
+        // the nearest node is at most a cell's diagonal farther away than the surface
+        assert!(
+            clearance <= nearest && clearance >= 0.9 * (nearest - 0.09),
+            "{text}: {clearance}, {nearest}"
+        );
+    }
+}
+
 /// At an edge sharper than a right angle no ray along an axis or the normal meets the solid, and no cell
 /// around the edge has its middle or a corner in it.
 #[test]

@@ -173,7 +173,7 @@ impl<'a> Search<'a> {
             if space.size().max_element() < smallest || self.matters_at(space.centre(), operand, removed) {
                 return Proof::Open;
             }
-            open.extend(halves(&space));
+            open.extend(halves(&space, DVec3::ZERO));
         }
         Proof::Idle
     }
