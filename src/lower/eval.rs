@@ -223,8 +223,9 @@ impl Lowering<'_> {
                 .label(later, "defined here")
                 .help("a name means what was defined above it: move this line down, or that one up"),
             (None, Some(_)) if self.against_place && matches!(name, "r" | "R") => {
+                let set = self.set_by.shown(name, "2");
                 diagnostic.at("not defined above").help(format!(
-                    "define it above: write `let {name} = 1`, or `param {name} = 1` for what `-D {name}=2` may set"
+                    "define it above: write `let {name} = 1`, or `param {name} = 1` for what `{set}` may set"
                 ))
             }
             (None, None) if name.len() > 1 && parse_unit(name).is_some() => {

@@ -109,7 +109,7 @@ pub(super) fn value(name: &str, in_scene: bool) -> Option<&'static str> {
         "Y" => "write `y`",
         "Z" => "write `z`",
         "auto" | "automatic" | "default" if !in_scene => {
-            "nothing is chosen for a shape: write a number; a param has a value that `-D` changes, as in `param r = 0.5`"
+            "nothing is chosen for a shape: write a number; a param, as in `param r = 0.5`, has one that can be set from outside"
         }
         "auto" | "automatic" | "default" => {
             "leave the key out: what is chosen then is told by `rfm explain KEY`"

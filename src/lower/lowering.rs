@@ -6,6 +6,7 @@ use std::sync::Arc;
 
 use super::module::Module;
 use super::names::Names;
+use super::options::SetBy;
 use super::value::Value;
 use crate::diagnostic::{Code, Diagnostic, SourceId, Span};
 use crate::files::Files;
@@ -62,6 +63,8 @@ pub(super) struct Lowering<'a> {
     pub bare: HashSet<String>,
     /// The method that all scenes get, whatever they state.
     pub method: Option<Method>,
+    /// What sets params, for advice about them.
+    pub set_by: SetBy,
     /// Whether some params are no constants.
     pub has_open_params: bool,
     max_nodes: usize,
@@ -125,6 +128,7 @@ impl Lowering<'_> {
             dimensions: HashMap::new(),
             bare: HashSet::new(),
             method: None,
+            set_by: SetBy::default(),
             has_open_params: false,
             max_nodes,
             budget_reported: false,
@@ -222,7 +226,10 @@ impl Lowering<'_> {
     fn report_budget(&mut self, message: String, remedy: &str, span: Span) {
         if !std::mem::replace(&mut self.budget_reported, true) {
             let span = self.user_span(span);
-            let help = format!("{remedy}, or allow more with --max-nodes");
+            let help = match self.set_by.more_operations() {
+                Some(more) => format!("{remedy}, or {more}"),
+                None => remedy.to_string(),
+            };
             self.report(Diagnostic::error(Code::TOO_LARGE, span, message).help(help));
         }
     }

@@ -25,6 +25,7 @@ mod module;
 mod names;
 mod needed;
 mod offsets;
+mod options;
 mod outline;
 mod paths;
 mod probes;
@@ -38,74 +39,25 @@ mod unused;
 mod value;
 pub mod vocabulary;
 
-use std::collections::BTreeMap;
 use std::sync::OnceLock;
 
 pub use foreign::known_elsewhere;
 pub use imports::{Imported, unread};
 pub use module::{Module, NamedSolid, OpenParams, ParamValue};
+pub use options::{Options, SetBy};
 pub use scene::{
     AskedMean, Bounce, Container, Fluid, Gravity, Obstacle, Opening, Picture, Run, Scene, SceneProbe, Skin,
     Solver, Tolerance, Truth,
 };
 
 use crate::diagnostic::{Code, Diagnostic, Severity, Source, SourceId, Span};
-use crate::files::Files;
 use crate::ir::Expr as Operation;
-use crate::quantity::{Dimension, Unit, in_unit, parse_unit};
-use crate::sph::Method;
+use crate::quantity::{Unit, in_unit, parse_unit};
 use crate::syntax::Ast;
 use crate::syntax::ast::{Argument, Attribute, Definition, Expr, ExprKind, Function, Item, Name, Param};
 use lowering::{KnownDimension, Lowering};
 use names::{Kind, RESERVED, TIME};
 use value::Value;
-
-/// Limits and overrides of a lowering.
-#[derive(Debug, Clone, Default)]
-pub struct Options {
-    /// Values for params in SI units, as `-D name=value` gives them.
-    pub overrides: BTreeMap<String, f64>,
-    /// Dimensions of those overrides that were given with a unit.
-    pub dimensions: BTreeMap<String, Dimension>,
-    /// Where those overrides stand that a file of params gives, such as `params.toml:3`. The others are set by `-D`.
-    pub places: BTreeMap<String, String>,
-    /// Most operations to which a file may unroll. `None` for [`MAX_NODES`], or [`NODES_PER_BYTE`] for each
-    /// byte of the file and of those that it imports if that is more.
-    pub max_nodes: Option<usize>,
-    /// The method of every scene, in place of the one that it states. Defaults that depend on the method
-    /// follow it.
-    pub method: Option<Method>,
-    /// Params that stay open: solids have them as `Expr::Parameter` with their number in [`Module::params`]. No scene
-    /// is read then. `None` if all params are constants.
-    pub open: Option<OpenParams>,
-    /// The files that the file may name. By default there are none.
-    pub files: Files,
-}
-
-impl Options {
-    /// How a param is given a value where it is given one now: by `-D d=8mm`, or by a line of a file.
-    fn setting(&self, name: &str, value: &str) -> String {
-        let written = self.written(name, value);
-        match self.places.get(name) {
-            None => format!("write {written}"),
-            Some(place) => format!("write {written} at {place}"),
-        }
-    }
-
-    /// The words that give a param a value, in a file or after the command.
-    fn written(&self, name: &str, value: &str) -> String {
-        let in_file = self.places.contains_key(name);
-        if in_file { format!("{name} = \"{value}\"") } else { format!("-D {name}=\"{value}\"") }
-    }
-
-    /// A message about the value that a param is given, with the place of that value if it stands in a file.
-    fn about_setting(&self, name: &str, message: String) -> String {
-        match self.places.get(name) {
-            None => message,
-            Some(place) => format!("{place}: {message}"),
-        }
-    }
-}
 
 /// Most operations to which a short file may unroll by default.
 pub const MAX_NODES: usize = 1_000_000;
@@ -165,6 +117,7 @@ fn lower_here(
     let max_nodes = options.max_nodes.unwrap_or_else(|| MAX_NODES.max(NODES_PER_BYTE * bytes));
     let mut lowering = Lowering::new(ast.text.clone(), max_nodes);
     lowering.method = options.method;
+    lowering.set_by = options.set_by;
     lowering.has_open_params = options.open.is_some();
     for item in &prelude().items {
         lowering.item(item, options);
@@ -571,8 +524,7 @@ impl<'a> Lowering<'a> {
             diagnostic = match crate::diagnostic::nearest(name, declared.iter().map(String::as_str)) {
                 Some(near) => diagnostic.help(format!("did you mean `{near}`?")),
                 None if vocabulary::is_key(name) => {
-                    let set =
-                        if options.places.contains_key(name) { "set `p` here" } else { "write `-D p=…`" };
+                    let set = options.setting_of_new_param(name);
                     diagnostic.help(format!(
                         "it is a key of scenes: declare a param for it, as in `param p = …` and `{name}: p`, and {set}"
                     ))

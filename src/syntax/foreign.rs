@@ -43,7 +43,7 @@ pub(super) fn item(word: &str) -> Option<&'static str> {
         }
         "var" | "const" | "define" | "float" | "double" | "int" | "real" | "number" | "set" | "uniform"
         | "vec2" | "vec3" | "local" | "auto" => {
-            "write `let name = …`, or `param name = …` for a number that `-D name=…` may set"
+            "write `let name = …`, or `param name = …` for a number that can be set from outside"
         }
         "cube" | "cuboid" | "block" => {
             "a solid has a name, and a box two corners: write `solid part = box([0, 0, 0], [1, 1, 1])`"

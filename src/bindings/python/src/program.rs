@@ -11,7 +11,7 @@ use pyo3::types::{PyBytes, PyDict, PyString, PyTuple, PyType};
 use rfm::compile::{files_beside, text_of};
 use rfm::diagnostic::{Diagnostics, Source, SourceId};
 use rfm::files::Files;
-use rfm::lower::Options;
+use rfm::lower::{Options, SetBy};
 use rfm::quantity::{Dimension, parse_quantity};
 use rfm::solid::Chosen;
 use rfm::{Error, Program, Solid};
@@ -143,7 +143,8 @@ impl PyProgram {
         let dimensions =
             params.iter().filter_map(|param| Some((param.name.clone(), param.dimension?))).collect();
         let overrides = params.into_iter().map(|param| (param.name, param.value)).collect();
-        let options = Options { overrides, dimensions, files, ..Options::default() };
+        let set_by = SetBy::Python;
+        let options = Options { overrides, dimensions, files, set_by, ..Options::default() };
         let program = py.detach(|| Program::check(source, options));
         program.map(Self::new).map_err(|found| of_diagnostics(py, &found))
     }

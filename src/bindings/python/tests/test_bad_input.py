@@ -61,6 +61,30 @@ def test_a_program_has_only_names():
     assert not any(other in program for other in (3, None, b"a", ["a"]))
 
 
+def test_advice_about_params_is_that_of_python(tmp_path):
+    text = "rfm 1\nparam d = 20 mm\nparam r = 20 mm in 1 mm .. 1 m\nsolid s = sphere(d) or sphere(r)"
+    [bare] = rfm.load(text, d=8).warnings
+    assert bare.help == 'write d="8000 mm", or d="8 mm" if that is meant'
+    (tmp_path / "part.rfm").write_text(text)
+    main = 'rfm 1\nimport "part.rfm" as part\nsolid both = part.s\n'
+    for wrong, words in (
+        (lambda: rfm.load(text, d="8 kg"), 'write d="20 mm"'),
+        (lambda: rfm.load(text).with_params(d="8 kg"), 'write d="20 mm"'),
+        (lambda: rfm.load(text, r=8), 'in SI units: write r="8 mm"'),
+        (lambda: rfm.load(text, q=8), "declared params: d, r"),
+        (lambda: rfm.load(text, density=8), "`param p = …` and `density: p`, and write `rfm.load(path, p=…)`"),
+        (lambda: rfm.load(main, tmp_path / "main.rfm", **{"part.d": "8 kg"}), 'write **{"part.d": "20 mm"}'),
+        (lambda: rfm.load("rfm 1\nsolid s = r <= 1 and x^2 + y^2 <= R^2"), "`rfm.load(path, R=2)`"),
+        (lambda: rfm.load("rfm 1\nfloat a = 1"), "set from outside"),
+        (lambda: rfm.load("rfm 1\nsolid s = sum i in 0..10000000: x <= i"), "shorter"),
+    ):
+        with pytest.raises(rfm.RfmError) as raised:
+            wrong()
+        advice = [found.help or "" for found in raised.value.diagnostics]
+        assert any(words in help for help in advice), str(raised.value)
+        assert not any(flag in help for help in advice for flag in ("-D", "--")), str(raised.value)
+
+
 def test_a_param_without_a_unit_takes_any():
     assert rfm.load("rfm 1\nparam a = 1\nsolid s = sphere(a)", a="8 kg").params["a"].value == 8.0
 
