@@ -134,6 +134,25 @@ impl Grid {
     /// What reaches no farther out of a box than this, in its longest sides, counts as within it.
     pub const BESIDE: f64 = 1e-3;
 
+    /// A grid of which the box and the numbers of cells are known, as of one that was stored.
+    ///
+    /// # Errors
+    /// [`GridError`] if no grid can have them.
+    pub fn of_cells(bounds: &Aabb, cells: [usize; 3]) -> Result<Self, GridError> {
+        if !bounds.is_finite() || bounds.size().min_element() <= 0.0 {
+            return Err(GridError::BadBox(*bounds));
+        }
+        for count in cells {
+            if count == 0 {
+                return Err(GridError::TooFewCells(count));
+            }
+            cell_count(count as f64)?;
+        }
+        let grid = Self { bounds: *bounds, cells };
+        check_side(grid.spacing().min_element(), bounds)?;
+        Ok(grid)
+    }
+
     /// A grid for what of a solid's bounds lies in a box: around the bounds, or filling the part in the box if that
     /// is smaller.
     ///
@@ -227,6 +246,16 @@ mod tests {
             assert_eq!((nodes[0], nodes[nodes.len() - 1]), (domain.min[axis], domain.max[axis]));
             assert!(nodes.is_sorted_by(|a, b| a < b));
         }
+    }
+
+    #[test]
+    fn a_grid_is_made_again_of_its_box_and_its_cells() {
+        let bounds = Aabb::new(DVec3::new(-1.0, 0.0, 2.0), DVec3::new(2.0, 1.0, 2.5));
+        let grid = Grid::around(&bounds, Resolution::Cells(30)).unwrap();
+        assert_eq!(Grid::of_cells(grid.bounds(), grid.cells()), Ok(grid));
+        assert_eq!(Grid::of_cells(&unit_box(), [4, 0, 4]), Err(GridError::TooFewCells(0)));
+        assert!(matches!(Grid::of_cells(&unit_box(), [4, usize::MAX, 4]), Err(GridError::TooManyCells(_))));
+        assert!(matches!(Grid::of_cells(&Aabb::EMPTY, [4; 3]), Err(GridError::BadBox(_))));
     }
 
     #[test]

@@ -50,5 +50,7 @@ fn _rfm(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(program::load, module)?)?;
     module.add_function(wrap_pyfunction!(program::program_from_pickle, module)?)?;
     module.add_function(wrap_pyfunction!(program::solid_from_pickle, module)?)?;
+    module.add_function(wrap_pyfunction!(mesh::mesh_from_pickle, module)?)?;
+    module.add_function(wrap_pyfunction!(slice::slice_from_pickle, module)?)?;
     Ok(())
 }

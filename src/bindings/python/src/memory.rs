@@ -5,9 +5,11 @@ use std::ptr::null_mut;
 
 use numpy::npyffi::{NpyTypes, PY_ARRAY_API, get_type_object, npy_intp};
 use numpy::{Element, PyArray, PyArrayDescrMethods, PyArrayMethods, PyUntypedArrayMethods, ndarray};
-use pyo3::exceptions::PyMemoryError;
+use pyo3::exceptions::{PyMemoryError, PyValueError};
 use pyo3::prelude::*;
 use rfm_columns::Column;
+
+use crate::points::numpy;
 
 /// The columns of a two-dimensional array.
 pub fn columns<T: Element, const N: usize>(array: &Bound<'_, PyArray<T, ndarray::Ix2>>) -> [Column<T>; N] {
@@ -64,6 +66,44 @@ pub fn new_array<'py, T: Element>(
     };
     // SAFETY: it was made with this type of numbers; they are plain numbers, for which any bits will do
     Ok(unsafe { array.cast_into_unchecked() })
+}
+
+/// The rows of an array of shape (n, N), copied. `dtype` is NumPy's name of `T`, into which other numbers are turned.
+///
+/// # Errors
+/// `ValueError` for another shape, and those of NumPy for what is no such array.
+pub fn rows_of<T: Element + Copy, const N: usize>(
+    given: &Bound<'_, PyAny>,
+    dtype: &str,
+) -> PyResult<Vec<[T; N]>> {
+    let array = contiguous::<T>(given, dtype)?;
+    let &[_, columns] = array.shape() else { return Err(wrong_shape(&array)) };
+    if columns != N {
+        return Err(wrong_shape(&array));
+    }
+    let numbers = array.try_readonly()?;
+    let (rows, _) = numbers.as_slice()?.as_chunks::<N>();
+    Ok(rows.to_vec())
+}
+
+/// An array as one whose numbers lie one after the other in memory, as Rust reads them.
+///
+/// # Errors
+/// Those of NumPy for what is no array of numbers.
+pub fn contiguous<'py, T: Element>(
+    given: &Bound<'py, PyAny>,
+    dtype: &str,
+) -> PyResult<Bound<'py, PyArray<T, ndarray::IxDyn>>> {
+    let array = numpy(given.py())?.call_method1("require", (given, dtype, ["C", "A"]))?;
+    Ok(array.cast_into()?)
+}
+
+/// Refuses an array for its shape.
+pub fn wrong_shape<T: Element>(array: &Bound<'_, PyArray<T, ndarray::IxDyn>>) -> PyErr {
+    PyValueError::new_err(format!(
+        "an array of the pickle has the shape {:?}, which does not fit",
+        array.shape()
+    ))
 }
 
 /// A read-only array that shows a slice.

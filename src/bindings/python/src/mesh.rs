@@ -2,12 +2,13 @@
 
 use std::io::{BufWriter, Write};
 use std::path::{Path, PathBuf};
-use std::sync::{Arc, OnceLock};
+use std::sync::OnceLock;
 
 use numpy::{PyArray1, PyArray2, PyArrayMethods};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::sync::PyOnceLock;
+use pyo3::types::PyTuple;
 use rfm::Solid;
 use rfm::field::Field;
 use rfm::geom::Aabb;
@@ -20,7 +21,10 @@ use rfm::solid::Bounds;
 use rfm::view;
 
 use crate::error::{not_read, refused};
+use crate::memory::rows_of;
+use crate::points::aabb;
 use crate::pool::{Threads, Watch, run_watched};
+use crate::solid::PySolid;
 
 /// A way to make a mesh, ended by Ctrl-C.
 pub type Mesher = fn(&dyn Field, &Grid, &Watch) -> Result<Mesh, MeshError>;
@@ -60,19 +64,43 @@ fn unbounded(solid: &Solid) -> String {
 }
 
 /// A closed triangle mesh of a solid's surface. Its arrays are read-only; copy them to change them.
+///
+/// A pickle holds the arrays and what was found about them; nothing is meshed again. As long as ``thin_cells`` was not
+/// asked for, it holds the solid, too.
 #[pyclass(frozen, module = "rfm", name = "Mesh")]
 pub struct PyMesh {
     mesh: Mesh,
-    report: Report,
-    /// What it was made of, and in which cells; `None` for an empty solid.
-    made_of: Option<Arc<(Solid, Grid)>>,
+    findings: Findings,
+    /// What it was made of, and in which cells; `None` for an empty solid, and for a mesh from a pickle whose thin
+    /// cells are counted.
+    made_of: Option<(Py<PySolid>, Grid)>,
     thin_cells: OnceLock<usize>,
     vertices: PyOnceLock<Py<PyAny>>,
     normals: PyOnceLock<Py<PyAny>>,
     triangles: PyOnceLock<Py<PyAny>>,
 }
 
-impl PyMesh {
+/// What was found about a mesh when it was made.
+#[derive(Clone, Copy)]
+struct Findings {
+    /// m³
+    volume: f64,
+    /// m²
+    area: f64,
+    /// Whether every edge lies in exactly two triangles, also if there is none.
+    closed: bool,
+    /// m
+    max_distance: f64,
+}
+
+/// A mesh before it is one of Python's: with the cells in which it was made, if there were any.
+pub struct Found {
+    mesh: Mesh,
+    findings: Findings,
+    grid: Option<Grid>,
+}
+
+impl Found {
     /// The mesh of a solid in a box, or in its own bounds.
     ///
     /// # Errors
@@ -97,10 +125,28 @@ impl PyMesh {
         if no_slivers {
             mesh::remove_slivers(&mut found);
         }
-        let report = mesh::check(&found, &*field);
-        Ok(Self::checked(found, report, Some((solid.clone(), grid))))
+        Ok(Self::checked(found, &*field, Some(grid)))
     }
 
+    /// The mesh of an empty solid.
+    fn empty() -> Self {
+        let nowhere = rfm::field::Closures { omega: |_| -1.0, gradient: |_| DVec3::ZERO };
+        Self::checked(Mesh::default(), &nowhere, None)
+    }
+
+    fn checked(mesh: Mesh, field: &dyn Field, grid: Option<Grid>) -> Self {
+        let Report { volume, area, closed, max_distance, .. } = mesh::check(&mesh, field);
+        Self { mesh, findings: Findings { volume, area, closed, max_distance }, grid }
+    }
+
+    /// The mesh as one of Python's, with the solid that it was made of.
+    pub fn of_solid(self, solid: &Bound<'_, PySolid>) -> PyMesh {
+        let made_of = self.grid.map(|grid| (solid.clone().unbind(), grid));
+        PyMesh::new(self.mesh, self.findings, made_of, None)
+    }
+}
+
+impl PyMesh {
     /// The number of cells in which parts of the solid hide, found when it is first asked for.
     ///
     /// # Errors
@@ -109,34 +155,24 @@ impl PyMesh {
         if let Some(count) = self.thin_cells.get() {
             return Ok(*count);
         }
-        let Some(made_of) = self.made_of.clone() else { return Ok(0) };
+        let Some((solid, grid)) = &self.made_of else { return Ok(0) };
+        let (solid, grid) = (solid.get().solid().clone(), grid.clone());
         let found = run_watched(py, Threads::Auto, move |watch| {
-            let (solid, grid) = &*made_of;
-            mesh::thin_cells(&*solid.surface(*grid.bounds()), grid, watch)
+            mesh::thin_cells(&*solid.surface(*grid.bounds()), &grid, watch)
         })?
         .map_err(refused)?;
         Ok(*self.thin_cells.get_or_init(|| found.count))
     }
 
-    /// The mesh of an empty solid.
-    fn empty() -> Self {
-        let nowhere = rfm::field::Closures { omega: |_| -1.0, gradient: |_| DVec3::ZERO };
-        let empty = Mesh::default();
-        let report = mesh::check(&empty, &nowhere);
-        Self::checked(empty, report, None)
-    }
-
-    fn checked(mesh: Mesh, report: Report, made_of: Option<(Solid, Grid)>) -> Self {
+    fn new(
+        mesh: Mesh,
+        findings: Findings,
+        made_of: Option<(Py<PySolid>, Grid)>,
+        thin_cells: Option<usize>,
+    ) -> Self {
         let [vertices, normals, triangles] = [PyOnceLock::new(), PyOnceLock::new(), PyOnceLock::new()];
-        Self {
-            mesh,
-            report,
-            made_of: made_of.map(Arc::new),
-            thin_cells: OnceLock::new(),
-            vertices,
-            normals,
-            triangles,
-        }
+        let thin_cells = thin_cells.map_or_else(OnceLock::new, OnceLock::from);
+        Self { mesh, findings, made_of, thin_cells, vertices, normals, triangles }
     }
 }
 
@@ -242,19 +278,19 @@ impl PyMesh {
     /// Volume that the mesh encloses, m³.
     #[getter]
     fn volume(&self) -> f64 {
-        self.report.volume
+        self.findings.volume
     }
 
     /// Area of the surface, m².
     #[getter]
     fn area(&self) -> f64 {
-        self.report.area
+        self.findings.area
     }
 
     /// Whether every edge lies in exactly two triangles. An empty mesh is not closed.
     #[getter]
     fn closed(&self) -> bool {
-        self.report.closed && self.report.triangles > 0
+        self.findings.closed && !self.mesh.triangles.is_empty()
     }
 
     /// Number of cells in which parts of the solid hide that are too thin for the mesh.
@@ -267,7 +303,7 @@ impl PyMesh {
     /// to an eighth of the squared cell times its curvature.
     #[getter]
     fn max_distance(&self) -> f64 {
-        self.report.max_distance
+        self.findings.max_distance
     }
 
     /// Writes the mesh to a file; the ending chooses the format: .stl .ply .obj .vtp .glb .3mf,
@@ -334,7 +370,7 @@ impl PyMesh {
     }
 
     fn __repr__(&self) -> String {
-        let Report { vertices, triangles, .. } = self.report;
+        let (vertices, triangles) = (self.mesh.positions.len(), self.mesh.triangles.len());
         let closed = match (triangles, self.closed()) {
             (0, _) => "empty",
             (_, true) => "closed",
@@ -342,4 +378,59 @@ impl PyMesh {
         };
         format!("<rfm.Mesh {vertices} vertices, {triangles} triangles, {closed}>")
     }
+
+    fn __reduce__<'py>(&self, py: Python<'py>) -> PyResult<(Bound<'py, PyAny>, Bound<'py, PyTuple>)> {
+        let rebuild = py.import("rfm._rfm")?.getattr("_mesh")?;
+        let arrays = (self.vertices(py)?, self.normals(py)?, self.triangles(py)?);
+        let Findings { volume, area, closed, max_distance } = self.findings;
+        let thin_cells = self.thin_cells.get().copied();
+        // only the thin cells are still asked of the solid, and once they are counted it need not come along
+        let made_of = self.made_of.as_ref().filter(|_| thin_cells.is_none()).map(|(solid, grid)| {
+            let Aabb { min, max } = grid.bounds();
+            (solid.clone_ref(py), (min.to_array(), max.to_array()), grid.cells())
+        });
+        let findings = (volume, area, closed, max_distance);
+        Ok((rebuild, (arrays, findings, thin_cells, made_of).into_pyobject(py)?))
+    }
+}
+
+/// A mesh from its arrays, what was found about it, and what it was made of; for pickles.
+///
+/// # Errors
+/// `ValueError` or `TypeError` if these are not what a mesh has.
+#[pyfunction(name = "_mesh")]
+pub fn mesh_from_pickle(
+    arrays: [Bound<'_, PyAny>; 3],
+    findings: (f64, f64, bool, f64),
+    thin_cells: Option<usize>,
+    made_of: Option<(Py<PySolid>, Bound<'_, PyAny>, [usize; 3])>,
+) -> PyResult<PyMesh> {
+    let [vertices, normals, triangles] = arrays;
+    let (volume, area, closed, max_distance) = findings;
+    let vectors = |given| -> PyResult<Vec<DVec3>> {
+        Ok(rows_of::<f64, 3>(given, "f8")?.into_iter().map(DVec3::from_array).collect())
+    };
+    let (positions, normals) = (vectors(&vertices)?, vectors(&normals)?);
+    let triangles = rows_of::<u32, 3>(&triangles, "u4")?;
+    let count = positions.len();
+    if count > Mesh::MAX_VERTICES || normals.len() != count {
+        let normals = normals.len();
+        return Err(PyValueError::new_err(format!("the mesh has {count} vertices and {normals} normals")));
+    }
+    if !positions.iter().chain(&normals).all(|vector| vector.is_finite()) {
+        return Err(PyValueError::new_err("a vertex or a normal of the mesh is not finite"));
+    }
+    if let Some(corner) = triangles.iter().flatten().find(|&&corner| corner as usize >= count) {
+        return Err(PyValueError::new_err(format!(
+            "a triangle has the vertex {corner}, and there are {count}"
+        )));
+    }
+    let made_of = match made_of {
+        Some((solid, bounds, cells)) => {
+            Some((solid, Grid::of_cells(&aabb(&bounds)?, cells).map_err(refused)?))
+        }
+        None => None,
+    };
+    let mesh = Mesh { positions, normals, triangles, ..Mesh::default() };
+    Ok(PyMesh::new(mesh, Findings { volume, area, closed, max_distance }, made_of, thin_cells))
 }

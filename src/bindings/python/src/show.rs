@@ -12,7 +12,7 @@ use rfm::view::{
 use rfm::{Experiment, Solid, slice};
 
 use crate::pool::{Threads, run};
-use crate::slice::PySlice;
+use crate::slice::Sliced;
 
 /// Mesh cells along the longest side of a solid that is shown: a page should be small.
 const CELLS: usize = 64;
@@ -47,7 +47,7 @@ pub fn picture(
     let Some(domain) = domain else { return Ok(None) };
     let middle = solid.bounds().aabb().unwrap_or(domain).centre().y;
     let plane = slice::Plane::new(slice::Axis::Y, middle);
-    PySlice::new(py, (solid, chosen), plane, 200, None, Some(domain), Threads::Auto)?.svg(py).map(Some)
+    Sliced::new(py, (solid, chosen), plane, 200, None, Some(domain), Threads::Auto)?.svg(py).map(Some)
 }
 
 /// A simulation: its particles and obstacles as they are now.

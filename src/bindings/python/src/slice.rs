@@ -2,9 +2,10 @@
 
 use std::path::PathBuf;
 
-use numpy::{PyArray1, PyArrayMethods};
+use numpy::{PyArray1, PyArrayMethods, PyUntypedArrayMethods};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
+use pyo3::types::PyTuple;
 use rfm::Solid;
 use rfm::field::Field;
 use rfm::geom::Aabb;
@@ -14,8 +15,10 @@ use rfm::slice::{self, Axis, Plane, Samples, SliceError, Window};
 use rfm::solid::Chosen;
 
 use crate::error::refused;
+use crate::memory::{contiguous, wrong_shape};
 use crate::mesh::write_file;
 use crate::pool::{Threads, run_watched};
+use crate::solid::PySolid;
 
 /// The plane that one of three coordinates states.
 ///
@@ -38,27 +41,31 @@ pub fn plane(coordinates: [Option<f64>; 3]) -> PyResult<Plane> {
 
 /// What is sampled.
 #[derive(Clone)]
-struct Sliced {
+struct Shape {
     solid: Solid,
     /// The cheaper program that keeps the tolerance of the file.
     chosen: Option<Chosen>,
 }
 
-impl Sliced {
+impl Shape {
+    fn of(solid: &PySolid) -> Self {
+        Self { solid: solid.solid().clone(), chosen: solid.chosen().cloned() }
+    }
+
     fn field(&self) -> &dyn Field {
         self.chosen.as_ref().map_or(&self.solid, |chosen| chosen)
     }
 }
 
-/// ω in a plane: samples, and pictures of them.
-#[pyclass(frozen, module = "rfm", name = "Slice")]
-pub struct PySlice {
-    sliced: Sliced,
+/// A shape with its samples in a plane.
+pub struct Sliced {
+    shape: Shape,
     samples: Samples,
+    /// Samples along the longer side.
     number: usize,
 }
 
-impl PySlice {
+impl Sliced {
     /// Samples a solid, by the cheaper program that keeps its tolerance if there is one.
     pub fn new(
         py: Python<'_>,
@@ -79,12 +86,12 @@ impl PySlice {
                 )));
             }
         };
-        let sliced = Sliced { solid: solid.clone(), chosen: chosen.cloned() };
-        let sampled = sliced.clone();
+        let shape = Shape { solid: solid.clone(), chosen: chosen.cloned() };
+        let sampled = shape.clone();
         let samples = run_watched(py, threads, move |watch| {
             slice::sample_while(sampled.field(), plane, window, number, &|| !watch.is_over())
         })?;
-        Ok(Self { sliced, samples: samples.map_err(refused)?, number })
+        Ok(Self { shape, samples: samples.map_err(refused)?, number })
     }
 
     /// The bytes of a picture, drawn from a field with its name, in a part of a plane with a number of samples.
@@ -95,11 +102,11 @@ impl PySlice {
         + Send
         + 'static,
     ) -> PyResult<Vec<u8>> {
-        let (sliced, number) = (self.sliced.clone(), self.number);
+        let (shape, number) = (self.shape.clone(), self.number);
         let Samples { plane, window, .. } = self.samples;
         run_watched(py, Threads::Auto, move |_| {
             let mut picture = Vec::new();
-            draw(sliced.field(), sliced.solid.name(), plane, window, number, &mut picture).map(|()| picture)
+            draw(shape.field(), shape.solid.name(), plane, window, number, &mut picture).map(|()| picture)
         })?
         .map_err(refused)
     }
@@ -110,6 +117,27 @@ impl PySlice {
             slice::write_svg(field, name, plane, window, number, svg)
         })?)
         .map_err(refused)
+    }
+
+    /// The bytes of an image, at the resolution of screens that are sharp.
+    fn png(&self, py: Python<'_>) -> PyResult<Vec<u8>> {
+        self.drawn(py, |field, name, plane, window, number, png| {
+            slice::write_png(field, name, plane, window, number, 2.0, png)
+        })
+    }
+}
+
+/// ω in a plane: samples, and pictures of them. A pickle holds the samples and the solid, of which pictures are drawn.
+#[pyclass(frozen, module = "rfm", name = "Slice")]
+pub struct PySlice {
+    /// The solid that is drawn.
+    solid: Py<PySolid>,
+    sliced: Sliced,
+}
+
+impl PySlice {
+    pub fn new(solid: &Bound<'_, PySolid>, sliced: Sliced) -> Self {
+        Self { solid: solid.clone().unbind(), sliced }
     }
 
     /// The coordinates of columns or of rows, m.
@@ -129,44 +157,44 @@ impl PySlice {
     /// ``origin="lower"``.
     #[getter]
     fn omega<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
-        let Samples { rows, columns, omega, .. } = &self.samples;
+        let Samples { rows, columns, omega, .. } = &self.sliced.samples;
         Ok(PyArray1::from_slice(py, omega).reshape([*rows, *columns])?.into_any())
     }
 
     /// Coordinates of the columns, m: array of shape (columns,).
     #[getter]
     fn u<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
-        self.along(py, self.samples.columns, |column| self.samples.position(column, 0).x)
+        self.along(py, self.sliced.samples.columns, |column| self.sliced.samples.position(column, 0).x)
     }
 
     /// Coordinates of the rows, m: array of shape (rows,).
     #[getter]
     fn v<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
-        self.along(py, self.samples.rows, |row| self.samples.position(0, row).y)
+        self.along(py, self.sliced.samples.rows, |row| self.sliced.samples.position(0, row).y)
     }
 
     /// Names of the coordinates u and v, such as ("x", "z").
     #[getter]
     fn axes(&self) -> (&'static str, &'static str) {
-        let (right, up) = self.samples.plane.axis.right_and_up();
+        let (right, up) = self.sliced.samples.plane.axis.right_and_up();
         (right.name(), up.name())
     }
 
     /// Corners of the window as matplotlib's ``extent``: (u0, u1, v0, v1), m.
     #[getter]
     fn extent(&self) -> (f64, f64, f64, f64) {
-        let Window { min, max } = self.samples.window;
+        let Window { min, max } = self.sliced.samples.window;
         (min.x, max.x, min.y, max.y)
     }
 
     /// The drawing as an SVG document: bands of ω, the outline, axes and a bar of colours.
     #[pyo3(name = "svg")]
     fn svg_document(&self, py: Python<'_>) -> PyResult<String> {
-        self.svg(py)
+        self.sliced.svg(py)
     }
 
     fn _repr_svg_(&self, py: Python<'_>) -> PyResult<String> {
-        self.svg(py)
+        self.sliced.svg(py)
     }
 
     /// Writes the drawing to a file, .svg or .png.
@@ -174,10 +202,8 @@ impl PySlice {
         let ending =
             path.extension().map(|ending| ending.to_string_lossy().to_lowercase()).unwrap_or_default();
         let picture = match &*ending {
-            "svg" => self.svg(py)?.into_bytes(),
-            "png" => self.drawn(py, |field, name, plane, window, number, png| {
-                slice::write_png(field, name, plane, window, number, 2.0, png)
-            })?,
+            "svg" => self.sliced.svg(py)?.into_bytes(),
+            "png" => self.sliced.png(py)?,
             _ => {
                 let path = path.display();
                 return Err(PyValueError::new_err(format!(
@@ -189,7 +215,43 @@ impl PySlice {
     }
 
     fn __repr__(&self) -> String {
-        let Samples { plane, rows, columns, .. } = &self.samples;
-        format!("<rfm.Slice of {} in {plane}, {rows} × {columns} samples>", self.sliced.solid.name())
+        let Samples { plane, rows, columns, .. } = &self.sliced.samples;
+        let name = self.sliced.shape.solid.name();
+        format!("<rfm.Slice of {name} in {plane}, {rows} × {columns} samples>")
     }
+
+    fn __reduce__<'py>(&self, py: Python<'py>) -> PyResult<(Bound<'py, PyAny>, Bound<'py, PyTuple>)> {
+        let rebuild = py.import("rfm._rfm")?.getattr("_slice")?;
+        let Samples { plane, window: Window { min, max }, .. } = &self.sliced.samples;
+        let (axis, window) = (plane.axis.name(), [min.x, min.y, max.x, max.y]);
+        let solid = self.solid.clone_ref(py);
+        let (number, omega) = (self.sliced.number, self.omega(py)?);
+        Ok((rebuild, (solid, axis, plane.value, window, number, omega).into_pyobject(py)?))
+    }
+}
+
+/// A slice from its solid, its plane and its samples; for pickles.
+///
+/// # Errors
+/// `ValueError`, `TypeError` or `RfmError` if these are not what a slice has.
+#[pyfunction(name = "_slice")]
+pub fn slice_from_pickle(
+    solid: &Bound<'_, PySolid>,
+    axis: &str,
+    value: f64,
+    window: [f64; 4],
+    number: usize,
+    omega: &Bound<'_, PyAny>,
+) -> PyResult<PySlice> {
+    let plane = plane(["x", "y", "z"].map(|name| (name == axis).then_some(value)))?;
+    let [u0, v0, u1, v1] = window;
+    let window = Window::new(DVec2::new(u0, v0), DVec2::new(u1, v1));
+    let (columns, rows) = window.grid(number).map_err(refused)?;
+    let omega = contiguous::<f64>(omega, "f8")?;
+    if omega.shape() != [rows, columns] {
+        return Err(wrong_shape(&omega));
+    }
+    let omega = omega.try_readonly()?.as_slice()?.to_vec();
+    let samples = Samples { plane, window, columns, rows, omega };
+    Ok(PySlice::new(solid, Sliced { shape: Shape::of(solid.get()), samples, number }))
 }

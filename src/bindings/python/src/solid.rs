@@ -15,14 +15,14 @@ use rfm_columns::Obstacle;
 
 use crate::collision::collide;
 use crate::evaluate::ask;
-use crate::mesh::PyMesh;
+use crate::mesh::{Found, PyMesh};
 use crate::path::first_entry;
 use crate::points::aabb;
 use crate::pool::{Threads, run_watched};
 use crate::program::PyProgram;
 use crate::results::{array, corners, no_out, several};
 use crate::show;
-use crate::slice::PySlice;
+use crate::slice::{PySlice, Sliced};
 use crate::source::{Asked, text};
 
 /// A compiled obstacle: ω, its gradient, its sign and its surface.
@@ -71,6 +71,15 @@ impl PySolid {
 
     fn omega_at(&self, p: DVec3) -> f64 {
         self.chosen.as_ref().map_or_else(|| self.solid.omega(p), |chosen| chosen.omega(p))
+    }
+
+    pub fn solid(&self) -> &Solid {
+        &self.solid
+    }
+
+    /// The cheaper program that keeps the tolerance of the file.
+    pub fn chosen(&self) -> Option<&Chosen> {
+        self.chosen.as_ref()
     }
 
     /// The box that is drawn.
@@ -551,8 +560,7 @@ impl PySolid {
     )]
     #[allow(clippy::too_many_arguments)] // they have names in Python
     fn mesh(
-        &self,
-        py: Python<'_>,
+        slf: &Bound<'_, Self>,
         cells: Option<usize>,
         cell: Option<f64>,
         method: &str,
@@ -569,10 +577,11 @@ impl PySolid {
         };
         let domain = r#box.map(aabb).transpose()?;
         let mesher = crate::mesh::mesher(method)?;
-        let solid = self.solid.clone();
-        run_watched(py, threads, move |watch| {
-            PyMesh::of(&solid, domain, resolution, mesher, no_slivers, watch)
-        })?
+        let solid = slf.get().solid.clone();
+        let found = run_watched(slf.py(), threads, move |watch| {
+            Found::of(&solid, domain, resolution, mesher, no_slivers, watch)
+        })?;
+        Ok(found?.of_solid(slf))
     }
 
     /// ω in a plane.
@@ -595,8 +604,7 @@ impl PySolid {
     #[pyo3(text_signature = "($self, *, x=None, y=None, z=None, samples=320, window=None, threads=None)")]
     #[allow(clippy::too_many_arguments)] // they have names in Python
     fn slice(
-        &self,
-        py: Python<'_>,
+        slf: &Bound<'_, Self>,
         x: Option<f64>,
         y: Option<f64>,
         z: Option<f64>,
@@ -605,8 +613,10 @@ impl PySolid {
         threads: Threads,
     ) -> PyResult<PySlice> {
         let plane = crate::slice::plane([x, y, z])?;
-        let solid = (&self.solid, self.chosen.as_ref());
-        PySlice::new(py, solid, plane, samples, window, self.domain(), threads)
+        let this = slf.get();
+        let solid = (&this.solid, this.chosen.as_ref());
+        let sliced = Sliced::new(slf.py(), solid, plane, samples, window, this.domain(), threads)?;
+        Ok(PySlice::new(slf, sliced))
     }
 
     /// The solid as C, for programs without Python: text of a file with ω and ∇ω at one point and over columns.
