@@ -2,7 +2,6 @@
 
 use super::super::foreign;
 use super::super::words::ITEM_WORDS;
-use super::ranges::members;
 use super::{Slip, bracketed, fits, last_number, last_word, parts, unclosed};
 use crate::diagnostic::{Code, Diagnostic, Span};
 
@@ -145,28 +144,6 @@ impl Slip<'_> {
             self.unexpected()
                 .help(format!("a fold has one variable: write `{head}: {fold} {}: …`", second.trim()))
         })
-    }
-
-    /// `any(i in 0..4, …)`, `sum(i in 0..4: …)` and `any(… for i in 0..4)`
-    pub(super) fn fold_as_a_call(&self) -> Option<Diagnostic> {
-        let line = self.on_its_line();
-        let open = if self.found == "(" { self.at } else { self.at - line.len() + line.rfind('(')? };
-        let fold = last_word(self.text[..open].trim_end());
-        let inner = bracketed(&self.text[open..])?;
-        let (head, body) = match inner.split_once(" for ") {
-            Some((body, head)) => (head.trim(), body.trim()),
-            None => {
-                let (head, body) = inner.split_at(inner.find([',', ':'])?);
-                (head.trim(), body[1..].trim())
-            }
-        };
-        let (variable, range) = head.split_once(" in ").filter(|_| FOLDS.contains(&fold) && fits(&[head]))?;
-        let range = members(range.trim()).unwrap_or_else(|| range.trim().to_string());
-        let body = if fits(&[body]) { body } else { "…" };
-        Some(
-            self.unexpected()
-                .help(format!("a fold has no brackets: write `{fold} {variable} in {range}: {body}`")),
-        )
     }
 
     /// `sin^2(x)`

@@ -106,6 +106,28 @@ impl Slip<'_> {
         })
     }
 
+    /// `any(i in 0..4, …)`, `sum(i in 0..4: …)` and `any(… for i in 0..4)`
+    pub(super) fn fold_as_a_call(&self) -> Option<Diagnostic> {
+        let line = self.on_its_line();
+        let open = if self.found == "(" { self.at } else { self.at - line.len() + line.rfind('(')? };
+        let fold = last_word(self.text[..open].trim_end());
+        let inner = bracketed(&self.text[open..])?;
+        let (head, body) = match inner.split_once(" for ") {
+            Some((body, head)) => (head.trim(), body.trim()),
+            None => {
+                let (head, body) = inner.split_at(inner.find([',', ':'])?);
+                (head.trim(), body[1..].trim())
+            }
+        };
+        let (variable, range) = head.split_once(" in ").filter(|_| FOLDS.contains(&fold) && fits(&[head]))?;
+        let range = members(range.trim()).unwrap_or_else(|| range.trim().to_string());
+        let body = if fits(&[body]) { body } else { "…" };
+        Some(
+            self.unexpected()
+                .help(format!("a fold has no brackets: write `{fold} {variable} in {range}: {body}`")),
+        )
+    }
+
     /// `sum(i, 0..5, i)`
     pub(super) fn fold_of_three(&self) -> Option<Diagnostic> {
         let line = self.on_its_line();
@@ -314,7 +336,7 @@ pub(super) fn replaced(formula: &str, name: &str, value: &str) -> String {
 }
 
 /// The members of a fold as they are written here: `0..5` and `[1, 2]` stay, and `range(5)` is `0..5`.
-pub(super) fn members(range: &str) -> Option<String> {
+fn members(range: &str) -> Option<String> {
     if let Some(arguments) = range.strip_prefix("range").and_then(bracketed) {
         return match parts(arguments)[..] {
             [end] => Some(format!("0..{end}")),
