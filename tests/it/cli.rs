@@ -284,7 +284,7 @@ fn plates_between_the_nodes_are_measured_with_the_cells_that_they_need() {
 fn a_check_gives_each_solid_the_cells_and_the_time_that_it_needs() {
     let text = b"rfm 1\nsolid slow = (noise(40*[x, y, z]) or noise(200*[x, y, z])) and box()\n\
         solid shell = sphere(1) \\ sphere(0.97)\nsolid ball = sphere(1)";
-    let outcome = rfm_reading(root(), &["check", "--json", "--budget", "40", "-"], text).expect(0);
+    let outcome = rfm_reading(root(), &["check", "--json", "--budget", "28", "-"], text).expect(0);
     let document = outcome.json();
     let of_unit = 4.0 / 3.0 * std::f64::consts::PI;
     for (number, volume, is_fine) in [(1, of_unit * (1.0 - 0.97_f64.powi(3)), true), (2, of_unit, false)] {

@@ -141,16 +141,16 @@ fn params_that_stay_open_give_the_values_of_params_that_were_set() {
 #[test]
 fn hundreds_of_parts_with_params_are_short_texts() {
     let mut text = "rfm 1\nparam r = 0.1\nparam d = 0.2\n\
-                    solid balls = any i in 0..300: ball([d*(mod(i, 7) - 3), 2*sin(i*1.7), d*floor(i/40) - t*i/300], \
+                    solid balls = any i in 0..150: ball([d*(mod(i, 7) - 3), 2*sin(i*1.7), d*floor(i/40) - t*i/300], \
                     r*(1 + i/100))\n\
-                    solid posts = any i in 0..120: cylinder(r*(1 + i/100), d + 1).rotate_x(i*d).move([sin(i), 2*cos(i), 0])\n\
-                    solid blobs = (sum i in 0..300: r*(1 + i/50)/((x - 2*sin(i*d))^2 + (y - i/100)^2 + z^2)) >= 40*d\n\
+                    solid posts = any i in 0..80: cylinder(r*(1 + i/100), d + 1).rotate_x(i*d).move([sin(i), 2*cos(i), 0])\n\
+                    solid blobs = (sum i in 0..150: r*(1 + i/50)/((x - 2*sin(i*d))^2 + (y - i/100)^2 + z^2)) >= 40*d\n\
                     let b0 = sphere(r)\n"
         .to_string();
-    for i in 1..40 {
+    for i in 1..25 {
         text += &format!("let b{i} = blend(b{}, ball([{i}*d/10, r*sin({i}), z/9], 2*r), 0.05)\n", i - 1);
     }
-    text += "solid chain = b39\n";
+    text += "solid chain = b24\n";
     let program = Program::from_source("s.rfm", text).unwrap_or_else(|e| panic!("{e}"));
     let (opened, fixed) = program.with_open_params().unwrap();
     assert!(fixed.is_empty(), "{fixed:?}");
