@@ -4,6 +4,7 @@ mod agreement;
 mod bad_input;
 mod blocks;
 mod bounds;
+mod budgets;
 mod cells;
 mod certificates;
 mod circles;
