@@ -174,6 +174,17 @@ impl Twist {
     }
 }
 
+/// Directions that are spread evenly, along a spiral from pole to pole.
+pub(crate) fn directions(count: usize) -> impl Iterator<Item = DVec3> {
+    let golden = std::f64::consts::PI * (3.0 - 5.0_f64.sqrt());
+    (0..count).map(move |i| {
+        let z = 1.0 - (2 * i + 1) as f64 / count as f64;
+        let (sin, cos) = (golden * i as f64).sin_cos();
+        let r = (1.0 - z * z).sqrt();
+        DVec3::new(r * cos, r * sin, z)
+    })
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -212,7 +212,8 @@ measured all the same.";
 LARGE_ANGLE = "W0409":
 "Angles are radians unless a unit says otherwise, and this one is more than a whole turn. Write `45 deg` for degrees, or
 `45 rad` if radians are meant. A rate as in `.rotate_z(10*t)` is in radians per second, and is asked about only if it is
-a number that is usual in degrees, such as 45 or 360.";
+a number that is usual in degrees, such as 45 or 360. So is a number that no angle of `atan2`, `atan`, `asin` or `acos`
+reaches, as in `atan2(y, x) <= 45`.";
 CONSTANT_SOLID = "W0410":
 "The solid does not depend on x, y or z: it is all of space if its value is positive, and empty otherwise. A solid is an
 inequality such as `x² + y² <= 1 and 0 <= z <= 1`, or a standard solid such as `sphere(1)`. The same holds for an operand of

@@ -11,6 +11,7 @@ use super::{
     shells::{Roots, shells},
 };
 use crate::field::Field;
+use crate::geom::directions;
 
 /// The findings about a mesh.
 #[derive(Debug, Clone, PartialEq)]
@@ -234,20 +235,10 @@ fn sign_change_distance(field: &dyn Field, p: DVec3, direction: DVec3, (rounding
     if radius <= edge {
         return radius;
     }
-    let differs = |radius: f64| sphere(DIRECTIONS).any(|way| (field.omega(p + radius * way) > 0.0) != inside);
+    let differs =
+        |radius: f64| directions(DIRECTIONS).any(|way| (field.omega(p + radius * way) > 0.0) != inside);
     let finest = (0..FINE_RADII).map(|halvings| edge * f64::exp2(f64::from(1 - halvings)));
     finest.filter(|&radius| differs(radius)).fold(radius, f64::min)
-}
-
-/// Directions spread evenly.
-fn sphere(count: usize) -> impl Iterator<Item = DVec3> {
-    let golden = std::f64::consts::PI * (3.0 - 5.0_f64.sqrt());
-    (0..count).map(move |i| {
-        let z = 1.0 - (2 * i + 1) as f64 / count as f64;
-        let (sin, cos) = (golden * i as f64).sin_cos();
-        let r = (1.0 - z * z).sqrt();
-        DVec3::new(r * cos, r * sin, z)
-    })
 }
 
 #[cfg(test)]

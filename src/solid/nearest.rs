@@ -16,7 +16,7 @@ use super::bounds::search::{Effort, NODES_PER_WORK, SEARCH_RADIUS, Shrink, halve
 use super::bounds::whole::WholeFormula;
 use super::construction::Solid;
 use super::leaves::words;
-use crate::geom::Aabb;
+use crate::geom::{Aabb, directions};
 
 /// How far a point is from the surface.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -62,10 +62,7 @@ const OPERATIONS_OF_NODE: usize = 8;
 const SHORTEST_RAY: f64 = 1e-6;
 
 /// Directions that are tried where neither the normal nor an axis meets the surface.
-const ALL_AROUND: u32 = 64;
-
-/// The turn from one direction to the next, so that they are evenly spread: π (3 − √5).
-const GOLDEN_ANGLE: f64 = 2.399_963_229_728_653;
+const ALL_AROUND: usize = 64;
 
 /// Number of times that the length of a ray is doubled.
 const DOUBLINGS: i32 = 60;
@@ -210,14 +207,7 @@ impl Distances {
     /// Looks for the surface in all directions. (A solid such as xy ≤ −1 has neither a point on the axes nor, seen from
     /// the middle, a normal, and it has no end, so that cells of all space would have to find it.)
     fn rays_all_around(&self, best: &mut Best<'_>) {
-        // evenly spread along a spiral from pole to pole, none of them along an axis or a diagonal
-        let direction = |k: u32| {
-            let height = 1.0 - (2.0 * f64::from(k) + 1.0) / f64::from(ALL_AROUND);
-            let (sin, cos) = (GOLDEN_ANGLE * f64::from(k) + 0.3).sin_cos();
-            let radius = (1.0 - height * height).sqrt();
-            DVec3::new(radius * cos, radius * sin, height)
-        };
-        let directions: Vec<DVec3> = (0..ALL_AROUND).map(direction).collect();
+        let directions: Vec<DVec3> = directions(ALL_AROUND).collect();
         Self::longer_rays(best, SHORTEST_RAY, &directions);
     }
 
