@@ -17,7 +17,7 @@ fn main() -> Result<ExitCode, Box<dyn std::error::Error>> {
         if std::fs::read(&path)? == header {
             return Ok(ExitCode::SUCCESS);
         }
-        eprintln!("include/rfm.h is not what the source says: run `cargo run` in src/bindings/c/header");
+        eprintln!("include/rfm.h is not what the source says: run `cargo run -p rfm-header`");
         return Ok(ExitCode::FAILURE);
     }
     std::fs::write(path, header)?;
