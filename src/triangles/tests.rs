@@ -344,7 +344,7 @@ impl<'s> Columns<'s> {
 /// The bars of the project for a mesh of a hundred thousand triangles. It is long: `cargo test -- --ignored`.
 #[test]
 #[ignore = "a million points"]
-fn a_hundred_thousand_triangles() {
+fn study_of_a_hundred_thousand_triangles() {
     let bumpy = |u: DVec3| 0.7 + 0.1 * (17.0 * u.x).sin() * (15.0 * u.y).cos() + 0.1 * (19.0 * u.z).sin();
     let soup = ball(158, 320, bumpy);
     assert!(soup.len() > 100_000);

@@ -61,6 +61,7 @@ fn nested_ten_thousand_times() {
 }
 
 #[test]
+#[ignore = "long"]
 fn long_chains() {
     let n = 100_000;
     let terms: Vec<String> = (0..n).map(|i| format!("{i}*x")).collect();
@@ -116,6 +117,7 @@ fn many_mistakes() {
 }
 
 #[test]
+#[ignore = "long"]
 fn files_that_unroll_without_end() {
     check(solid("any i in 0..1e12: sphere(1)"), 1, "unrolls to more than 1000000 operations");
     check(solid("any i in 0..1000: any j in 0..1000: any k in 0..1000: sphere(1)"), 1, "E0210");

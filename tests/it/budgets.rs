@@ -6,6 +6,7 @@ use crate::tool::{rfm, rfm_reading, root};
 /// A solid with walls of one and a half cells is measured with the cells that it needs, and a slow solid leaves the
 /// others their share of the time.
 #[test]
+#[ignore = "long"]
 fn a_check_gives_each_solid_the_cells_and_the_time_that_it_needs() {
     let text = b"rfm 1\nsolid slow = (noise(40*[x, y, z]) or noise(200*[x, y, z])) and box()\n\
         solid shell = sphere(1) \\ sphere(0.97)\nsolid ball = sphere(1)";

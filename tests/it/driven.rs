@@ -366,6 +366,7 @@ scene s {{
 
 /// A ball that grows in water lifts its level by its volume, and is carried by the weight of what it displaces then.
 #[test]
+#[ignore = "long"]
 fn a_ball_that_grows_displaces_its_volume() {
     let text = "rfm 1
 solid b = sphere(0.15 + 0.1*clamp(2*t, 0, 1)).move([0.5, 0.5, 0.35])
@@ -396,6 +397,7 @@ scene s {
 /// A ball that swings fast, and not far, in a box full of water: the fluid moves along with half of the
 /// ball's volume, if its sound is fast enough for it.
 #[test]
+#[ignore = "long"]
 fn a_ball_that_swings_has_the_added_mass_of_half_its_volume() {
     let text = "rfm 1
 solid ball = sphere(0.1).move([0.01*(1 - cos(2*pi*5*t)), 0, 0])

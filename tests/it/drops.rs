@@ -48,6 +48,7 @@ scene sessile {
 /// A drop of 2 mm on a table, with its weight. (It left the table as a ball after 0.03 s, and a tenth of it became
 /// spray.)
 #[test]
+#[ignore = "long"]
 fn a_drop_stays_on_a_table() {
     let spacing = 0.25e-3;
     for method in ["wcsph", "dfsph"] {
@@ -122,6 +123,7 @@ fn a_free_ball_of_a_millimetre_keeps_still() {
 /// it does not fill the kernel. (When normals came from this image there, too, water in the depth counted as its surface,
 /// and had 0.014 m/s after 0.2 s.)
 #[test]
+#[ignore = "long"]
 fn water_keeps_still_in_a_dish() {
     let mut simulation = simulation(
         "rfm 1

@@ -50,7 +50,7 @@ fn every_example_checks_without_a_word() {
 
 #[test]
 #[ignore = "takes most of a minute"]
-fn the_long_examples_check_without_a_word() {
+fn study_of_the_long_examples() {
     check_without_a_word(examples().into_iter().filter(|path| LONG.contains(&stem(path))));
 }
 

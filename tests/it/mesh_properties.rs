@@ -123,6 +123,6 @@ fn sharp_meshes_of_random_solids_are_hardly_folded() {
 
 #[test]
 #[ignore = "takes minutes"]
-fn sharp_meshes_of_a_thousand_random_solids_are_hardly_folded() {
+fn study_of_a_thousand_sharp_meshes() {
     are_hardly_folded(1000);
 }

@@ -147,6 +147,7 @@ fn boxes() -> usize {
 }
 
 #[test]
+#[ignore = "long"]
 fn neither_exact_values_nor_rounded_ones_leave_the_range() {
     let mut random = Random(11);
     for (graph, root, evaluator, programs) in formulas() {
@@ -257,6 +258,7 @@ fn ends(random: &mut Random) -> [f64; 2] {
 }
 
 #[test]
+#[ignore = "long"]
 fn angles_hold_forty_digits_across_the_cut_and_around_the_origin() {
     let mut random = Random(23);
     for text in ["atan2(y, x)", "atan(x)"] {

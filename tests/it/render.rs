@@ -219,6 +219,7 @@ fn the_surface_of_the_fluid_has_the_colours_of_particles_and_is_cut() {
 }
 
 #[test]
+#[ignore = "long"]
 fn obstacles_are_hidden_by_name_and_cut() {
     let folder = tempfile::tempdir().unwrap();
     let here = folder.path();

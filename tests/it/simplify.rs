@@ -14,6 +14,7 @@ fn simplified(solid: &str, flags: &[&str]) -> Value {
 }
 
 #[test]
+#[ignore = "long"]
 fn the_measured_error_is_within_the_one_asked_for() {
     for (solid, cells, error, most) in [
         ("pawn", "96", "2 mm", 0.1),

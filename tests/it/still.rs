@@ -250,6 +250,7 @@ scene rest {
 }
 
 #[test]
+#[ignore = "long"]
 fn honey_that_sticks_to_its_vessel_stops() {
     // with the longest step that viscosity allows away from walls, speeds grow beside them
     for (walls, sticky) in [

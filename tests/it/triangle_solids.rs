@@ -346,10 +346,10 @@ fn points_in_single_precision_are_near() {
     }
 }
 
-/// The bars of the project, for a program that is optimised: `cargo test --release -- --ignored`.
+/// The bars of the project, for a program that is optimised: `cargo test --release -- --ignored study`.
 #[test]
 #[ignore = "it measures time"]
-fn a_hundred_thousand_triangles_are_quick() {
+fn study_of_the_time_for_a_hundred_thousand_triangles() {
     let path = format!("{}/examples/pawn.rfm", env!("CARGO_MANIFEST_DIR"));
     let solid = Program::from_path(path).unwrap().solid("pawn").unwrap();
     let grid = Grid::around(&solid.bounds().aabb().unwrap(), Resolution::Cells(180)).unwrap();

@@ -100,12 +100,14 @@ fn water_at_rest_bears_its_own_weight() {
 }
 
 #[test]
+#[ignore = "long"]
 fn water_at_rest_in_a_hollow_sphere() {
     // eight layers at the deepest place, one at the rim
     pressure_within("hydrostatic_sphere", 1080.0, 0.06);
 }
 
 #[test]
+#[ignore = "long"]
 fn water_over_a_pawn_stays_out_of_it() {
     // sixteen layers deviate by 1.5 %, although the collar is thinner than the support radius
     pressure_within("hydrostatic_pawn", 3170.0, 0.03);
@@ -182,6 +184,7 @@ fn vortices_keep_their_shape_and_decay() {
 }
 
 #[test]
+#[ignore = "long"]
 fn a_turning_cylinder_takes_the_fluid_along() {
     // eight spacings across the gap, and both walls cut the lattice; with slip at the walls all of it would
     // stay at rest and deviate by 1
@@ -228,6 +231,7 @@ const CAVITY: [(f64, f64, usize, f64); 15] = [
 ];
 
 #[test]
+#[ignore = "long"]
 fn a_lid_drags_the_fluid_of_a_cavity_round() {
     let mut simulation = advanced("cavity", "cavity", &[("across", 20.0)], 8.0);
     let y = 2.0 * simulation.parameters().spacing();
@@ -368,6 +372,7 @@ fn water_leaves_a_tank_with_the_speed_of_a_fall() {
 }
 
 #[test]
+#[ignore = "long"]
 fn a_channel_that_closes_on_itself_has_its_profile() {
     // eight spacings across; twenty deviate by 0.8 %
     velocity_within("poiseuille", &[("particles", 2413.0)], 0.03);
@@ -441,6 +446,7 @@ scene hit {{
 /// A jet that spreads on a plate, the lift of a body under water, a gate and a bottom that meet the walls of
 /// the box: means of forces, as the scenes state them.
 #[test]
+#[ignore = "long"]
 fn forces_on_bodies_are_those_of_momentum_and_of_archimedes() {
     for (name, scene, params, within) in [
         ("jet", 0, ("across", 5.0), 0.06),

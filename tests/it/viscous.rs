@@ -10,6 +10,7 @@ use crate::tool::{experiment, run_to, simulation};
 /// itself (Dean 1928), as in `examples/validation/poiseuille.rfm`, without any key of the method. With `dfsph` it was
 /// 11 % too slow while pressure took away that single particles pass each other.
 #[test]
+#[ignore = "long"]
 fn a_viscous_flow_in_a_channel_is_as_fast_as_is_known() {
     for (method, most) in [("wcsph", 0.05), ("dfsph", 0.08)] {
         channel(method, most);
@@ -56,6 +57,7 @@ scene channel {{
 /// particles along the wall must resist a shear as they are asked to: with forces along the lines between particles the
 /// flow of `dfsph` was 24 % too fast, and while pressure took away that single particles pass each other 8 % too slow.
 #[test]
+#[ignore = "long"]
 fn a_bent_pipe_flows_as_fast_as_is_known() {
     // G/4ν·(a² − q²) at the distance q from the axis; the bend changes the mean of it by less than 1 %
     let known = |p: DVec3| 7.5 * (0.25_f64.powi(2) - (p.truncate().length() - 1.0).powi(2) - p.z * p.z);
@@ -158,6 +160,7 @@ scene s {{
 /// carried by its pressure, by as much as with `dfsph`. (With sound of ten times the fluid's speed honey was a gas, and
 /// the plate bore 0.5 N.) Steps are those that viscosity allows.
 #[test]
+#[ignore = "long"]
 fn honey_below_a_plate_is_no_gas() {
     let loads = ["wcsph", "dfsph"].map(|method| {
         let mut simulation = simulation(&format!(
@@ -301,6 +304,7 @@ fn momentum(simulation: &Simulation) -> f64 {
 /// wall compresses it. Shifting must not move particles down the pressure: they take their momentum along. (When
 /// it did, 17 % of the momentum was gone after one and a half seconds.)
 #[test]
+#[ignore = "long"]
 fn shifting_leaves_a_compressed_fluid_alone() {
     for (keys, lost) in [("sound_speed: 6, artificial_viscosity: 0", 0.01), ("", 0.002)] {
         let mut simulation = simulation(&format!(
@@ -327,6 +331,7 @@ scene turning {{
 /// A ball that swings in a full box of water moves water as well: about half of what it displaces (Lamb 1932, §92), and
 /// a little more between walls. Fitted to its force over the last period; with pairs of pressures it is 0.75.
 #[test]
+#[ignore = "long"]
 fn a_ball_that_swings_moves_half_of_what_it_displaces() {
     let (radius, reach, omega) = (0.08_f64, 0.02, 10.0_f64);
     let mut simulation = simulation(

@@ -49,6 +49,7 @@ scene work {
 /// less a little artificial viscosity. The sum of force times way has the error of the steps and of forces in
 /// corners.
 #[test]
+#[ignore = "long"]
 fn a_piston_gives_what_the_water_has_then() {
     for method in ["wcsph", "dfsph"] {
         let mut simulation = simulation(&PISTON.replace("METHOD", method));
@@ -68,6 +69,7 @@ fn a_piston_gives_what_the_water_has_then() {
 /// Probes of the force on a piston, which is found in every step, change nothing; nor do they for a piston in
 /// a corner.
 #[test]
+#[ignore = "long"]
 fn work_does_not_depend_on_whether_forces_are_asked_for() {
     for method in ["wcsph", "dfsph"] {
         let [work, of_all_steps] = ["", "  probe push { force: piston }\n"].map(|probe| {
@@ -136,6 +138,7 @@ scene work {{
 /// 4πµLΩ²·a²b²/(b² − a²). With five spacings across the gap the friction is a sixth too large; it was a tenth too
 /// large when packing took 5 % of the mass, and with it of all forces.
 #[test]
+#[ignore = "long"]
 fn a_drum_works_by_friction() {
     let mut simulation = simulation(
         "rfm 1
@@ -166,6 +169,7 @@ scene work {
 
 /// A vessel that goes up and down: the work of a period comes back, and its errors do not add up to a finding.
 #[test]
+#[ignore = "long"]
 fn a_vessel_that_heaves_takes_back_what_it_gives() {
     for method in ["wcsph", "dfsph"] {
         let mut simulation = simulation(

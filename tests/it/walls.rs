@@ -175,6 +175,7 @@ fn a_turning_blade_stays_free_of_water() {
 }
 
 #[test]
+#[ignore = "long"]
 fn a_flap_as_wide_as_its_tank_pushes_nothing_out_of_it() {
     stays_free(FLAP);
 }

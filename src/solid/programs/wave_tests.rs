@@ -145,14 +145,14 @@ fn waves_have_the_bits_of_the_library() {
 
 #[test]
 #[ignore = "some minutes"]
-fn waves_have_the_bits_of_the_library_for_a_billion_arguments() {
+fn study_of_waves_for_a_billion_arguments() {
     let mut random = Random(2);
     compare(1_000_000_000, |_| random.argument());
 }
 
 #[test]
 #[ignore = "some minutes"]
-fn waves_have_the_bits_of_the_library_for_all_numbers_in_f32() {
+fn study_of_waves_for_all_numbers_in_f32() {
     let mut numbers = [0u32; 3];
     compare(3 << 32, |axis| {
         numbers[axis] = numbers[axis].wrapping_add(0x9e37_79b1); // odd, so that none is left out

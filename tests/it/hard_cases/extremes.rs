@@ -90,6 +90,7 @@ fn answers(solid: &Solid, p: DVec3) -> [f64; 3] {
 }
 
 #[test]
+#[ignore = "long"]
 fn every_program_has_a_defined_answer() {
     for expression in FIELDS {
         let [jit, interpreter] = solid(expression);

@@ -163,6 +163,7 @@ fn compilers() -> Vec<&'static str> {
 }
 
 #[test]
+#[ignore = "long"]
 fn c_of_every_operation_has_the_bits_of_rfm() {
     // all forms in one test take gcc minutes; the object files of another have them all
     let mut solids = solids_of_every_operation();
@@ -174,6 +175,7 @@ fn c_of_every_operation_has_the_bits_of_rfm() {
 }
 
 #[test]
+#[ignore = "long"]
 fn c_of_bent_solids_has_the_bits_of_rfm() {
     for compiler in compilers() {
         let counts = compare_c(compiler, &bent_solids(), FEW);
@@ -182,6 +184,7 @@ fn c_of_bent_solids_has_the_bits_of_rfm() {
 }
 
 #[test]
+#[ignore = "long"]
 fn loops_of_bent_solids_are_vectorised() {
     for compiler in compilers() {
         for solid in bent_solids().iter().filter(|solid| !["drills", "ripples"].contains(&solid.name())) {
@@ -208,6 +211,7 @@ fn sines_of_a_text_differ_from_those_of_rfm_at_few_points() {
 }
 
 #[test]
+#[ignore = "long"]
 fn c_of_random_solids_has_the_bits_of_rfm() {
     for compiler in compilers() {
         let counts = compare_c(compiler, &random_solids(5), FEW);
@@ -225,7 +229,7 @@ fn c_of_all_examples_has_the_bits_of_rfm() {
 
 #[test]
 #[ignore = "a million points for each of 150 solids: minutes"]
-fn c_has_the_bits_of_rfm_at_a_million_points() {
+fn study_of_c_at_a_million_points() {
     for compiler in compilers() {
         let mut counts = Counts::default();
         for solids in [solids_of_every_operation(), example_solids(), random_solids(100)] {
@@ -244,7 +248,7 @@ fn c_has_the_bits_of_rfm_at_a_million_points() {
 /// Nanoseconds per point of C and of machine code, in columns, the best of many rounds that take turns.
 #[test]
 #[ignore = "a measurement: run it alone, in a quiet moment"]
-fn c_takes_as_long_as_machine_code() {
+fn study_of_the_time_that_c_takes() {
     for compiler in compilers() {
         let mut solids = example_solids();
         solids.truncate(6);
@@ -308,6 +312,7 @@ fn folds() -> Vec<Solid> {
 }
 
 #[test]
+#[ignore = "long"]
 fn long_folds_are_short_texts_and_have_the_bits_of_rfm() {
     for solid in folds() {
         // straight lines of the longest would be 20 000
@@ -322,7 +327,7 @@ fn long_folds_are_short_texts_and_have_the_bits_of_rfm() {
 
 #[test]
 #[ignore = "a million points for each of four long folds: minutes"]
-fn long_folds_have_the_bits_of_rfm_at_a_million_points() {
+fn study_of_long_folds_at_a_million_points() {
     for compiler in compilers() {
         let counts = compare_c(compiler, &folds(), MANY);
         assert_eq!(counts.different, 0, "{compiler}: {counts:?}");
@@ -374,6 +379,7 @@ fn a_header_is_c_and_cplusplus_and_cuda_is_cplusplus() {
 }
 
 #[test]
+#[ignore = "long"]
 fn an_object_file_is_linked_into_a_c_host_and_has_the_bits_of_rfm() {
     if !is_here("gcc") {
         return;

@@ -139,6 +139,7 @@ fn params_that_stay_open_give_the_values_of_params_that_were_set() {
 
 /// Parts that differ in what params and time make of them are one function and a table, as those of constants are.
 #[test]
+#[ignore = "long"]
 fn hundreds_of_parts_with_params_are_short_texts() {
     let mut text = "rfm 1\nparam r = 0.1\nparam d = 0.2\n\
                     solid balls = any i in 0..150: ball([d*(mod(i, 7) - 3), 2*sin(i*1.7), d*floor(i/40) - t*i/300], \

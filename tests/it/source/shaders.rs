@@ -72,7 +72,7 @@ fn accepted(solid: &Solid) {
 
 #[test]
 #[ignore = "takes minutes"]
-fn naga_accepts_the_longest_examples() {
+fn study_of_the_longest_examples_by_naga() {
     example_solids().iter().for_each(accepted);
     let started = Instant::now();
     validate_wgsl(&shader(&balls(500), Target::Wgsl));
@@ -80,6 +80,7 @@ fn naga_accepts_the_longest_examples() {
 }
 
 #[test]
+#[ignore = "long"]
 fn naga_accepts_wgsl_and_glsl_of_every_operation() {
     solids().iter().for_each(accepted);
     validate_wgsl(&shader(&balls(40), Target::Wgsl));
