@@ -119,6 +119,20 @@ fn a_free_ball_of_a_millimetre_keeps_still() {
     assert!(speed < 0.06, "{speed} m/s");
 }
 
+/// The same where the solver keeps the density, with images for its pressures, too. (With a pressure that goes on
+/// linearly behind the walls the film had 0.10, an eighth of a ball 0.34 and half of one 0.25 m/s.)
+#[test]
+fn still_water_of_a_millimetre_keeps_its_density_at_walls() {
+    for (from, shape, least) in [
+        ("[0, 0, 0]", "z <= 0.8 mm", 0.02),
+        ("[0, 0, 0]", "sphere(1 mm)", 0.1),
+        ("[-2 mm, -2 mm, 0]", "sphere(1 mm)", 0.12),
+    ] {
+        let speed = speed_of_water(from, shape, "dfsph");
+        assert!(speed < least, "{shape} in a box from {from}: {speed} m/s");
+    }
+}
+
 /// Water with its weight in a dish that is an obstacle. In the edges of an obstacle there is one image, and with the fluid
 /// it does not fill the kernel. (When normals came from this image there, too, water in the depth counted as its surface,
 /// and had 0.014 m/s after 0.2 s.)

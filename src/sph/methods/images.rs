@@ -145,32 +145,30 @@ impl Plane {
 }
 
 impl Mirrors {
-    /// Finds the planes for the present places of the particles.
-    pub fn find(&mut self, core: &Core) {
+    /// The planes for the present places of the particles.
+    pub fn found(core: &Core) -> Self {
         let (n, h) = (core.particles.len(), core.parameters.support_radius);
-        self.walls.find(core, |i| Planes::near(core, i));
-        if !self.any() {
-            return;
+        let mut mirrors = Self::default();
+        mirrors.walls.find(core, |i| Planes::near(core, i));
+        if !mirrors.any() {
+            return mirrors;
         }
-        self.count.clear();
-        self.count.resize(n, 0);
-        for (normal, distance) in &mut self.columns {
-            normal.components_mut().into_iter().for_each(Vec::clear);
+        mirrors.count.resize(n, 0);
+        for (normal, distance) in &mut mirrors.columns {
             normal.resize(n);
-            distance.clear();
             distance.resize(n, OUT_OF_REACH * h);
         }
-        self.velocity.components_mut().into_iter().for_each(Vec::clear);
-        self.velocity.resize(n);
-        for (i, near) in self.walls.found() {
+        mirrors.velocity.resize(n);
+        for (i, near) in mirrors.walls.found() {
             let i = *i as usize;
-            self.velocity.set(i, near.velocity);
-            self.count[i] = near.each.len() as u8;
-            for (plane, (normal, distance)) in near.each.iter().zip(&mut self.columns) {
+            mirrors.velocity.set(i, near.velocity);
+            mirrors.count[i] = near.each.len() as u8;
+            for (plane, (normal, distance)) in near.each.iter().zip(&mut mirrors.columns) {
                 normal.set(i, plane.normal);
                 distance[i] = plane.distance;
             }
         }
+        mirrors
     }
 
     /// Whether a wall is near any particle.
@@ -260,3 +258,24 @@ impl<V> Image<V> {
 
 /// Makes one or more of any length, m, that is not zero.
 const MANY: f64 = 1e30;
+
+/// A pass that counts the images of each neighbour, too.
+#[derive(Clone, Copy)]
+pub(super) struct WithImages<'a, P> {
+    pub pass: P,
+    pub mirrors: &'a Mirrors,
+    /// Number of planes.
+    pub count: usize,
+}
+
+impl<'a, P> WithImages<'a, P> {
+    /// A pass over these planes. They are columns behind those of the pass itself.
+    pub fn new(pass: P, mirrors: &'a Mirrors) -> Self {
+        Self { pass, mirrors, count: 0 }
+    }
+
+    /// The pass for some particles, with as many planes as they need.
+    pub fn in_block(self, particles: Range<usize>) -> Self {
+        Self { count: self.mirrors.most(particles), ..self }
+    }
+}

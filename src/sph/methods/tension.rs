@@ -29,7 +29,7 @@
 //! The forces on a body of fluid that touches no wall have neither a resultant nor a torque, and those on one that
 //! does move it along none of its walls ([`bodies_of_fluid`]).
 
-use std::ops::Range;
+use std::{ops::Range, sync::Arc};
 
 use fearless_simd::{Simd, SimdFloat};
 use glam::DVec3;
@@ -37,7 +37,7 @@ use glam::DVec3;
 use super::{
     bodies_of_fluid,
     crowding::Crowding,
-    images::{self, COLUMNS, Image, Mirrors, Plane},
+    images::{self, COLUMNS, Image, Mirrors, Plane, WithImages},
     wetting,
 };
 use crate::sph::{
@@ -84,14 +84,14 @@ pub(super) struct Tension {
     /// Normals n, 1/m.
     normal: Vectors,
     force: Vectors,
-    mirrors: Mirrors,
+    mirrors: Arc<Mirrors>,
 }
 
 impl Tension {
     /// Finds which walls are wet, once the particles are sorted, if the fluid is under tension.
     pub fn find_wet_walls(&mut self, core: &mut Core) {
         if core.parameters.surface_tension != 0.0 {
-            self.mirrors.find(core);
+            self.mirrors = Arc::new(Mirrors::found(core));
             wetting::find(core, &self.mirrors);
         }
     }
@@ -150,7 +150,7 @@ impl Tension {
     }
 
     /// The walls as mirrors; `None` if none is near any particle.
-    pub fn mirrors(&self) -> Option<&Mirrors> {
+    pub fn mirrors(&self) -> Option<&Arc<Mirrors>> {
         self.mirrors.any().then_some(&self.mirrors)
     }
 
@@ -175,25 +175,6 @@ impl Tension {
 
 /// Columns of directions with their weights, and of planes.
 const DIRECTED: usize = 4 + COLUMNS;
-
-/// A pass that counts the images of each neighbour, too.
-#[derive(Clone, Copy)]
-struct WithImages<'a, P> {
-    pass: P,
-    mirrors: &'a Mirrors,
-    /// Number of planes.
-    count: usize,
-}
-
-impl<'a, P> WithImages<'a, P> {
-    fn new(pass: P, mirrors: &'a Mirrors) -> Self {
-        Self { pass, mirrors, count: 0 }
-    }
-
-    fn in_block(self, particles: Range<usize>) -> Self {
-        Self { count: self.mirrors.most(particles), ..self }
-    }
-}
 
 /// Finds n, n̂ and its weight.
 #[derive(Clone, Copy)]

@@ -348,6 +348,11 @@ impl Boundary {
         self.obstacles.is_empty()
     }
 
+    /// Whether nothing is as near as the reach, m, to two walls of the box that face each other.
+    pub fn is_wide(&self, reach: f64) -> bool {
+        self.domain.size().min_element() >= 2.0 * reach
+    }
+
     /// Whether a face of an obstacle before a particle lies in a wall of the box and looks out of it. The
     /// obstacle is then assumed to continue behind that wall, as one that stands out of the box does. Neither
     /// end can be seen, and the room behind the wall would otherwise count as a notch in both.

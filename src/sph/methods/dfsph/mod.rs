@@ -3,6 +3,7 @@
 mod ahead;
 mod arrest;
 mod full;
+mod mirrored;
 mod passes;
 mod rigid;
 mod scheme;

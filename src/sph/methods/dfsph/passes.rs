@@ -93,15 +93,29 @@ impl PairPass<0, 6, 8> for Densities<'_> {
         sums[5] = f.mul_add(r2, sums[5]);
     }
 
-    fn finish(&self, i: usize, [weight, x, y, z, squares, spread]: [f64; 6]) -> [f64; 8] {
+    fn finish(&self, i: usize, sums: [f64; 6]) -> [f64; 8] {
+        self.results(i, sums, DVec3::ZERO)
+    }
+}
+
+impl Densities<'_> {
+    /// The results of a particle from its sums, and from Σ d·(1 − q)³ of its own images.
+    pub(super) fn results(
+        &self,
+        i: usize,
+        [weight, x, y, z, squares, spread]: [f64; 6],
+        own_images: DVec3,
+    ) -> [f64; 8] {
         let Constants { mass_weight, mass_steepness, rest_density, .. } = self.constants;
         let [mut density, mut filled] = [mass_weight * weight; 2];
         let slope = -mass_steepness * DVec3::new(x, y, z);
         let squares = mass_steepness.powi(2) * squares;
         let mut crowding = slope / rest_density;
         let mut spread = mass_steepness / rest_density * spread / 3.0;
-        let mut factors = [slope.length_squared() + squares; 2];
-        if let Some((wall, completion)) = self.walls.near(i) {
+        // the images of a particle are pushed as it is
+        let own = slope - mass_steepness * own_images;
+        let mut factors = [own.length_squared() + squares; 2];
+        if let Some((wall, completion)) = self.walls.in_place_of_fluid(i) {
             filled += rest_density * wall.filled;
             density += rest_density * wall.barrier.part;
             crowding += wall.gradient;
@@ -152,7 +166,7 @@ impl PairPass<1, 3, 3> for Push<'_> {
 
     fn finish(&self, i: usize, sums: [f64; 3]) -> [f64; 3] {
         let push = self.constants.mass_steepness * DVec3::from_array(sums);
-        let Some((wall, completion)) = self.walls.near(i) else {
+        let Some((wall, completion)) = self.walls.in_place_of_fluid(i) else {
             return push.to_array();
         };
         let pressure = self.constants.rest_density * self.pressure[i];
@@ -237,7 +251,7 @@ impl PairPass<3, 1, 1> for Squeeze<'_> {
             };
             gradient.dot(self.velocity.get(i)) - if self.with_walls { sweep } else { 0.0 }
         };
-        [rate + self.constants.rest_density * self.walls.near(i).map_or(0.0, of_walls)]
+        [rate + self.constants.rest_density * self.walls.in_place_of_fluid(i).map_or(0.0, of_walls)]
     }
 }
 

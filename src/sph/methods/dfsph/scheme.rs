@@ -47,6 +47,8 @@
 //! before a free surface is that at the present places, so near a surface the density also differs by the
 //! change of this part in a step.
 //!
+//! In both systems a fluid under tension in a box has images in its walls instead ([`mirrored`](super::mirrored)).
+//!
 //! Artificial viscosity of rough motion ([`roughness`]) damps the noise of the particles' disorder, which
 //! nothing else would damp in a fluid without viscosity. It acts along the lines between particles, and so does
 //! the laminar viscosity unless it counts ([`SpinViscosity`]). Both conserve momentum, and angular
@@ -71,6 +73,7 @@ use smallvec::{SmallVec, smallvec};
 use super::super::{
     bodies_of_fluid::bodies,
     free_surface::FreeSurface,
+    images::WithImages,
     roughness::{self, Roughness},
     scheme::{Scheme, Start},
     shifting::{restore_crowding, save_crowding, shift},
@@ -320,7 +323,8 @@ impl DivergenceFree {
         let at_walls = self.walls.found().iter().map(|(i, (_, completion))| {
             STIFFER_AT_WALLS * square_of_norm(completion) * self.own_pressure[*i as usize]
         });
-        let greatest = at_walls.fold(in_the_depth, f64::max) / rest;
+        let is_completed = self.walls.mirrors().is_none();
+        let greatest = at_walls.filter(|_| is_completed).fold(in_the_depth, f64::max) / rest;
         let spacing = core.parameters.spacing();
         STABLE * 2.0 * spacing / (self.stiffness * greatest).sqrt()
     }
@@ -334,7 +338,7 @@ impl DivergenceFree {
         core.sort(&mut columns);
         core.find_near();
         self.tension.find_wet_walls(core);
-        self.walls.find(core);
+        self.walls.find(core, self.tension.mirrors());
         let mut density = std::mem::take(&mut core.particles.density);
         let (constants, walls) = (Constants::of(&core.parameters), &self.walls);
         let pass = Densities { constants, surface: &self.surface, walls };
@@ -343,7 +347,11 @@ impl DivergenceFree {
         let Vectors { x, y, z } = &mut self.crowding;
         let [linear, barrier] = [&mut self.forces.factor, &mut self.places.factor];
         self.loaded.resize(density.len(), 0.0);
-        core.sum(&pass, [], [&mut self.loaded, linear, barrier, x, y, z, &mut self.spread, &mut density]);
+        let out = [&mut self.loaded[..], linear, barrier, x, y, z, &mut self.spread, &mut density];
+        match self.walls.mirrors() {
+            Some(mirrors) => core.sum(&WithImages::new(pass, mirrors), mirrors.columns(), out),
+            None => core.sum(&pass, [], out),
+        }
         core.particles.density = density;
     }
 

@@ -2,6 +2,7 @@
 
 use rayon::prelude::*;
 
+use super::super::images::WithImages;
 use super::passes::{Constants, Continuation, Push, Squeeze};
 use super::rigid::Rigid;
 use super::walls::Walls;
@@ -237,7 +238,14 @@ impl Solver {
         let (constants, continuation) = (Constants::of(&core.parameters), self.continuation);
         let pass = Push { constants, walls, pressure: s, continuation };
         let Vectors { x, y, z } = push;
-        core.sum(&pass, [s], [&mut x[..], y, z]);
+        match walls.mirrors() {
+            Some(mirrors) => {
+                let [ax, ay, az, ad, bx, by, bz, bd, cx, cy, cz, cd] = mirrors.columns();
+                let columns = [s, ax, ay, az, ad, bx, by, bz, bd, cx, cy, cz, cd];
+                core.sum(&WithImages::new(pass, mirrors), columns, [&mut x[..], y, z]);
+            }
+            None => core.sum(&pass, [s], [&mut x[..], y, z]),
+        }
     }
 
     /// Finds the dρ/dt of velocities, or of accelerations in a second.
@@ -263,7 +271,14 @@ impl Solver {
             with_walls: matches!(of, RateOf::Velocity(_)),
         };
         let Vectors { x, y, z } = velocity;
-        core.sum(&pass, [&x[..], y, z], [&mut self.rate]);
+        match walls.mirrors() {
+            Some(mirrors) => {
+                let [ax, ay, az, ad, bx, by, bz, bd, cx, cy, cz, cd] = mirrors.columns();
+                let columns = [&x[..], y, z, ax, ay, az, ad, bx, by, bz, bd, cx, cy, cz, cd];
+                core.sum(&WithImages::new(pass, mirrors), columns, [&mut self.rate]);
+            }
+            None => core.sum(&pass, [&x[..], y, z], [&mut self.rate]),
+        }
     }
 
     /// Notes the part of the walls in a(s) = M·(a of the pairs − 2ρ₀s·∇λ), for the system that changes

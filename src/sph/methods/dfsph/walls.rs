@@ -1,26 +1,38 @@
 //! Walls near particles, found once for all passes of a step.
 
+use std::sync::Arc;
+
 use glam::DMat3;
 
-use super::super::near_walls::NearWalls;
+use super::super::{images::Mirrors, near_walls::NearWalls};
 use super::rigid::Rigid;
 use crate::sph::{
     core::Core,
+    params::Parameters,
     particles::Vectors,
     walls::{Carried, Coverage, WallDrag},
 };
 
 /// The parts that walls take of the kernels of the particles near them, each with M = (1 − K)⁻¹.
 #[derive(Default)]
-pub(super) struct Walls(NearWalls<(WallsNear, DMat3)>);
+pub(super) struct Walls {
+    near: NearWalls<(WallsNear, DMat3)>,
+    /// The walls as planes, where the fluid has images in them instead: M is not needed then.
+    mirrors: Option<Arc<Mirrors>>,
+}
 
 /// The part that walls take of the kernel of one particle.
 pub(super) type WallsNear = Coverage<WallDrag, Carried>;
 
 impl Walls {
-    /// Finds the walls near all particles at their present positions.
-    pub fn find(&mut self, core: &Core) {
-        self.0.find(core, |i| {
+    /// Finds the walls near all particles at their present positions. A fluid under tension has images in walls that are
+    /// all mirrors of each other; those of a fluid of another method are none, as its own system knows none.
+    pub fn find(&mut self, core: &Core, mirrors: Option<&Arc<Mirrors>>) {
+        let Parameters { method, support_radius, .. } = &core.parameters;
+        let are_planes = core.boundary.is_box() && core.boundary.is_wide(*support_radius);
+        let are_planes = are_planes && method.numerics().keeps_density();
+        self.mirrors = mirrors.filter(|_| are_planes).cloned();
+        self.near.find(core, |i| {
             // without viscosity friction is not needed
             let wall: WallsNear = if core.parameters.viscosity > 0.0 {
                 core.coverage_with(i)?
@@ -34,35 +46,53 @@ impl Walls {
     /// The part that walls take of a particle's kernel, and its M; `None` if no wall is near.
     #[inline]
     pub fn near(&self, i: usize) -> Option<(&WallsNear, &DMat3)> {
-        self.0.near(i).map(|(wall, completion)| (wall, completion))
+        self.near.near(i).map(|(wall, completion)| (wall, completion))
     }
 
-    /// Writes M·a of each particle to `completed`.
+    /// Writes M·a of each particle to `completed`; a itself where it has images.
     pub fn complete(&self, a: &Vectors, completed: &mut Vectors) {
         completed.clone_from(a);
-        for &(i, (_, completion)) in self.0.found() {
+        if self.mirrors.is_some() {
+            return;
+        }
+        for &(i, (_, completion)) in self.near.found() {
             completed.set(i as usize, completion * a.get(i as usize));
         }
     }
 
-    /// Writes r + M·(v − r) of each particle to `completed`, where r is the velocity behind the walls. Across
+    /// Writes r + M·(v − r) of each particle to `completed`, where r is the velocity behind the walls; v itself where
+    /// it has images. Across
     /// the walls it is their velocity, and along them that of the fluid as a whole.
     pub fn complete_velocities(&self, v: &Vectors, (at, whole): (&Vectors, &Rigid), completed: &mut Vectors) {
         completed.clone_from(v);
-        for (i, (wall, completion)) in self.0.found() {
+        if self.mirrors.is_some() {
+            return;
+        }
+        for (i, (wall, completion)) in self.near.found() {
             let i = *i as usize;
             let behind = wall.velocity_behind(whole.at(at.get(i)));
             completed.set(i, behind + *completion * (v.get(i) - behind));
         }
     }
 
+    /// What walls near a particle stand for in sums by pressure; `None` if no wall is near, or the fluid has images there.
+    #[inline]
+    pub fn in_place_of_fluid(&self, i: usize) -> Option<(&WallsNear, &DMat3)> {
+        if self.mirrors.is_some() { None } else { self.near(i) }
+    }
+
+    /// The walls as mirrors, if the fluid has images in them.
+    pub fn mirrors(&self) -> Option<&Mirrors> {
+        self.mirrors.as_deref()
+    }
+
     /// The particles near walls: the index of each, the part that walls take of its kernel, and its M.
     pub fn found(&self) -> &[(u32, (WallsNear, DMat3))] {
-        self.0.found()
+        self.near.found()
     }
 
     /// Memory of this table, bytes.
     pub fn bytes(&self) -> usize {
-        self.0.bytes()
+        self.near.bytes()
     }
 }
