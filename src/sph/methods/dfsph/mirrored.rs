@@ -6,6 +6,9 @@
 //! one in a corner 0.34, and water 0.8 mm deep in a box 0.10. With images they are whole balls and an endless film, and
 //! have 0.05, 0.03 and 0.004 m/s.
 //!
+//! They are for a fluid that its tension rules, because they cost time: each neighbour of a particle near walls has one to
+//! seven of them.
+//!
 //! The image of j in a plane is as far from i as that of i is from j, and ∇W is mirrored. So with mirrored velocities the
 //! system is as symmetric as that of the fluid alone. This needs planes that are the same for both, which walls of the
 //! box are; of an obstacle each particle has a plane of its own.

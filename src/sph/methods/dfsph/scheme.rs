@@ -47,7 +47,8 @@
 //! before a free surface is that at the present places, so near a surface the density also differs by the
 //! change of this part in a step.
 //!
-//! In both systems a fluid under tension in a box has images in its walls instead ([`mirrored`](super::mirrored)).
+//! In both systems a fluid that its tension rules, in a box, has images in its walls instead
+//! ([`mirrored`](super::mirrored)).
 //!
 //! Artificial viscosity of rough motion ([`roughness`]) damps the noise of the particles' disorder, which
 //! nothing else would damp in a fluid without viscosity. It acts along the lines between particles, and so does
