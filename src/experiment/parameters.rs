@@ -122,10 +122,8 @@ pub(super) fn stirring(scene: &Scene, parameters: &Parameters) -> Option<Diagnos
     let speed = share * (surface_tension / (rest_density * spacing)).sqrt();
     (parameters.keeps_density() && speed > MUCH_STIRRED * expected_speed).then(|| {
         let at = scene.fluid.tension_span.unwrap_or(scene.fluid.shape_span);
-        // in the walls of a box without obstacles the fluid has images, and a drop there is a part of a free one
-        let times = if scene.obstacles.is_empty() { "several" } else { "up to sixteen" };
         let message = format!(
-            "with this method the surface tension stirs a fluid of so little viscosity: particles of a drop at rest keep up to {speed:.1e} m/s, and {times} times as much where it touches walls"
+            "with this method the surface tension stirs a fluid of so little viscosity: particles of a drop at rest keep up to {speed:.1e} m/s, and up to sixteen times as much where it touches walls"
         );
         Diagnostic::warning(Code::TENSION_STIRS, at, message)
             .help("write `method: wcsph`, or give the fluid more viscosity, or smaller particles")

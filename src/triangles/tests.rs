@@ -341,7 +341,7 @@ impl<'s> Columns<'s> {
     }
 }
 
-/// The bars of the project for a mesh of a hundred thousand triangles. It is long: `cargo test -- --ignored`.
+/// The bars of the project for a mesh of a hundred thousand triangles. It is long: `cargo test -- --ignored study`.
 #[test]
 #[ignore = "a million points"]
 fn study_of_a_hundred_thousand_triangles() {

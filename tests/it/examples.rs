@@ -49,8 +49,8 @@ fn every_example_checks_without_a_word() {
 }
 
 #[test]
-#[ignore = "takes most of a minute"]
-fn study_of_the_long_examples() {
+#[ignore = "long"]
+fn the_long_examples_check_without_a_word() {
     check_without_a_word(examples().into_iter().filter(|path| LONG.contains(&stem(path))));
 }
 

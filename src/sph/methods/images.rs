@@ -145,30 +145,32 @@ impl Plane {
 }
 
 impl Mirrors {
-    /// The planes for the present places of the particles.
-    pub fn found(core: &Core) -> Self {
+    /// Finds the planes for the present places of the particles.
+    pub fn find(&mut self, core: &Core) {
         let (n, h) = (core.particles.len(), core.parameters.support_radius);
-        let mut mirrors = Self::default();
-        mirrors.walls.find(core, |i| Planes::near(core, i));
-        if !mirrors.any() {
-            return mirrors;
+        self.walls.find(core, |i| Planes::near(core, i));
+        if !self.any() {
+            return;
         }
-        mirrors.count.resize(n, 0);
-        for (normal, distance) in &mut mirrors.columns {
+        self.count.clear();
+        self.count.resize(n, 0);
+        for (normal, distance) in &mut self.columns {
+            normal.components_mut().into_iter().for_each(Vec::clear);
             normal.resize(n);
+            distance.clear();
             distance.resize(n, OUT_OF_REACH * h);
         }
-        mirrors.velocity.resize(n);
-        for (i, near) in mirrors.walls.found() {
+        self.velocity.components_mut().into_iter().for_each(Vec::clear);
+        self.velocity.resize(n);
+        for (i, near) in self.walls.found() {
             let i = *i as usize;
-            mirrors.velocity.set(i, near.velocity);
-            mirrors.count[i] = near.each.len() as u8;
-            for (plane, (normal, distance)) in near.each.iter().zip(&mut mirrors.columns) {
+            self.velocity.set(i, near.velocity);
+            self.count[i] = near.each.len() as u8;
+            for (plane, (normal, distance)) in near.each.iter().zip(&mut self.columns) {
                 normal.set(i, plane.normal);
                 distance[i] = plane.distance;
             }
         }
-        mirrors
     }
 
     /// Whether a wall is near any particle.

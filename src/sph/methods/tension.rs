@@ -91,7 +91,13 @@ impl Tension {
     /// Finds which walls are wet, once the particles are sorted, if the fluid is under tension.
     pub fn find_wet_walls(&mut self, core: &mut Core) {
         if core.parameters.surface_tension != 0.0 {
-            self.mirrors = Arc::new(Mirrors::found(core));
+            // the table is lent to walls, which find theirs after this
+            if Arc::get_mut(&mut self.mirrors).is_none() {
+                self.mirrors = Arc::default();
+            }
+            if let Some(mirrors) = Arc::get_mut(&mut self.mirrors) {
+                mirrors.find(core);
+            }
             wetting::find(core, &self.mirrors);
         }
     }

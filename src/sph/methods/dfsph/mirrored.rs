@@ -3,8 +3,8 @@
 //! To a fluid under tension a wall is a mirror, and a body of fluid with its images is round ([`images`]). With walls that
 //! continue a pressure linearly (see [`scheme`](super::scheme)) the pressure in the edge of such a body was not the one
 //! that its tension needs: half a ball of water with a radius of 1 mm on a floor had 0.25 m/s after 20 ms, an eighth of
-//! one in a corner 0.34, and water 0.8 mm deep in a box 0.10. With images they are whole balls and an endless film, and
-//! have 0.05, 0.03 and 0.004 m/s.
+//! one in a corner 0.34, and a film of 0.8 mm in a box 0.20. With images they are whole balls and an endless film, and
+//! have 0.05, 0.03 and 0.09 m/s.
 //!
 //! They are for a fluid that its tension rules, because they cost time: each neighbour of a particle near walls has one to
 //! seven of them.
@@ -47,8 +47,9 @@ impl PairPass<COLUMNS, 6, 8> for WithImages<'_, Densities<'_>> {
             self.pass.add(d, r2, &[], [], sums);
             all += steepness(r2);
         });
-        // A neighbour and its images answer together, at most with the sum of what each does. (With the sum of their
-        // squares a step was too long for particles in a corner, and one of them left it at 17 m/s.)
+        // A neighbour and its images answer together, at most with the sum of what each does; a particle's own images count
+        // twice. So steps are rather too short. (With the sum of squares they were too long for particles in a corner,
+        // and one of them left it at 17 m/s.)
         sums[4] = all.mul_add(all, squares);
     }
 
@@ -58,6 +59,7 @@ impl PairPass<COLUMNS, 6, 8> for WithImages<'_, Densities<'_>> {
         let of_image = |mirrored: usize| {
             let in_these = (0..planes.len()).filter(|k| mirrored >> k & 1 == 1);
             let way: DVec3 = in_these.map(|k| 2.0 * planes[k].distance * planes[k].normal).sum();
+            // (1 − q)³, as in the sums
             way * (1.0 - way.length() / kernel.h).max(0.0).powi(3)
         };
         self.pass.results(i, sums, (1..1_usize << planes.len()).map(of_image).sum())

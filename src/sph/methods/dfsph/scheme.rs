@@ -321,11 +321,11 @@ impl DivergenceFree {
     fn pressure_dt(&self, core: &Core) -> f64 {
         let rest = core.parameters.rest_density;
         let in_the_depth = self.own_pressure.iter().copied().fold(0.0, f64::max);
-        let at_walls = self.walls.found().iter().map(|(i, (_, completion))| {
+        let completed = if self.walls.mirrors().is_some() { &[][..] } else { self.walls.found() };
+        let at_walls = completed.iter().map(|(i, (_, completion))| {
             STIFFER_AT_WALLS * square_of_norm(completion) * self.own_pressure[*i as usize]
         });
-        let is_completed = self.walls.mirrors().is_none();
-        let greatest = at_walls.filter(|_| is_completed).fold(in_the_depth, f64::max) / rest;
+        let greatest = at_walls.fold(in_the_depth, f64::max) / rest;
         let spacing = core.parameters.spacing();
         STABLE * 2.0 * spacing / (self.stiffness * greatest).sqrt()
     }
@@ -338,6 +338,7 @@ impl DivergenceFree {
         columns.extend(kept.iter_mut().map(|column| &mut **column));
         core.sort(&mut columns);
         core.find_near();
+        self.walls.give_back_mirrors();
         self.tension.find_wet_walls(core);
         self.walls.find(core, self.tension.mirrors());
         let mut density = std::mem::take(&mut core.particles.density);

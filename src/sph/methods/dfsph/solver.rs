@@ -250,16 +250,15 @@ impl Solver {
 
     /// Finds the dρ/dt of velocities, or of accelerations in a second.
     pub fn find_rate_of(&mut self, core: &Core, walls: &Walls, velocity: &Vectors, of: RateOf<'_>) {
-        let velocity = match self.continuation {
-            Continuation::Barrier => velocity,
-            Continuation::Linear => {
-                match of {
-                    RateOf::Velocity(whole) => {
-                        let at = &core.particles.position;
-                        walls.complete_velocities(velocity, (at, whole), &mut self.completed);
-                    }
-                    RateOf::Pressure => walls.complete(velocity, &mut self.completed),
-                }
+        let is_completed = self.continuation == Continuation::Linear && walls.mirrors().is_none();
+        let velocity = match of {
+            _ if !is_completed => velocity,
+            RateOf::Velocity(whole) => {
+                walls.complete_velocities(velocity, (&core.particles.position, whole), &mut self.completed);
+                &self.completed
+            }
+            RateOf::Pressure => {
+                walls.complete(velocity, &mut self.completed);
                 &self.completed
             }
         };

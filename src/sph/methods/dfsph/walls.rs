@@ -35,8 +35,9 @@ fn is_ruled_by_tension(parameters: &Parameters) -> bool {
 }
 
 impl Walls {
-    /// Finds the walls near all particles at their present positions. A fluid that its tension rules has images in walls
-    /// that are all mirrors of each other, unless it is of another method, whose own sums have none.
+    /// Finds the walls near all particles at their present positions. A fluid that its tension rules has images in the
+    /// walls of a box without obstacles, at least two support radii wide, unless it is of another method, whose own sums
+    /// have none.
     pub fn find(&mut self, core: &Core, mirrors: Option<&Arc<Mirrors>>) {
         let Parameters { method, support_radius, .. } = &core.parameters;
         let are_planes = core.boundary.is_box() && core.boundary.is_wide(*support_radius);
@@ -60,25 +61,18 @@ impl Walls {
         self.near.near(i).map(|(wall, completion)| (wall, completion))
     }
 
-    /// Writes M·a of each particle to `completed`; a itself where it has images.
+    /// Writes M·a of each particle to `completed`.
     pub fn complete(&self, a: &Vectors, completed: &mut Vectors) {
         completed.clone_from(a);
-        if self.mirrors.is_some() {
-            return;
-        }
         for &(i, (_, completion)) in self.near.found() {
             completed.set(i as usize, completion * a.get(i as usize));
         }
     }
 
-    /// Writes r + M·(v − r) of each particle to `completed`, where r is the velocity behind the walls; v itself where
-    /// it has images. Across
+    /// Writes r + M·(v − r) of each particle to `completed`, where r is the velocity behind the walls. Across
     /// the walls it is their velocity, and along them that of the fluid as a whole.
     pub fn complete_velocities(&self, v: &Vectors, (at, whole): (&Vectors, &Rigid), completed: &mut Vectors) {
         completed.clone_from(v);
-        if self.mirrors.is_some() {
-            return;
-        }
         for (i, (wall, completion)) in self.near.found() {
             let i = *i as usize;
             let behind = wall.velocity_behind(whole.at(at.get(i)));
@@ -90,6 +84,11 @@ impl Walls {
     #[inline]
     pub fn in_place_of_fluid(&self, i: usize) -> Option<(&WallsNear, &DMat3)> {
         if self.mirrors.is_some() { None } else { self.near(i) }
+    }
+
+    /// Gives the walls as mirrors back to the tension, which finds them anew.
+    pub fn give_back_mirrors(&mut self) {
+        self.mirrors = None;
     }
 
     /// The walls as mirrors, if the fluid has images in them.
