@@ -66,6 +66,8 @@
 //!
 //! Invariant: the densities are those of the present positions.
 
+#[cfg(test)]
+mod mirrored_tests;
 mod pressure;
 
 use glam::DMat3;
