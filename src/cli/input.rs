@@ -1,7 +1,7 @@
 //! Reads the file of a command from a path or from standard input, with params from flags. Messages go to
 //! standard error.
 
-use std::io::{IsTerminal, Read};
+use std::io::{Error, ErrorKind, IsTerminal, Read};
 use std::path::Path;
 
 use super::failure::{Failure, note};
@@ -9,7 +9,7 @@ use super::shared::Shared;
 use crate::cli::output::{self, Shown};
 use rfm::Program;
 use rfm::compile::{files_beside, text_of};
-use rfm::diagnostic::{Code, Diagnostics, Source, Style, render};
+use rfm::diagnostic::{Code, Diagnostics, Source, Style, nearest, render};
 use rfm::files::Files;
 use rfm::lower::Options;
 
@@ -23,11 +23,35 @@ pub(super) fn read(path: &Path) -> Result<Source, Failure> {
     } else {
         std::fs::File::open(path).and_then(|file| file.take(limit).read_to_end(&mut bytes))
     };
-    let text = result.and_then(|_| text_of(bytes));
-    let text =
-        text.map_err(|error| Failure::usage(format!("cannot read `{}`: {error}", Path::new(&name).shown())))?;
+    let text = result.and_then(|_| text_of(bytes)).map_err(|error| unreadable(path, &error))?;
     output::remember_input(path);
     Ok(Source::file(name, text))
+}
+
+/// Why a file cannot be read.
+fn unreadable(path: &Path, error: &Error) -> Failure {
+    if path == Path::new("-") {
+        return Failure::usage(format!("cannot read `<stdin>`: {error}"));
+    }
+    match error.kind() {
+        ErrorKind::NotFound => missing(path),
+        ErrorKind::IsADirectory => {
+            Failure::usage(format!("`{}` is a folder: name a file in it", path.shown()))
+        }
+        _ => Failure::usage(format!("cannot read `{}`: {error}", path.shown())),
+    }
+}
+
+/// The failure for a path at which there is neither a file nor a folder.
+pub(super) fn missing(path: &Path) -> Failure {
+    let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty());
+    let beside = std::fs::read_dir(folder.unwrap_or(Path::new("."))).into_iter().flatten().flatten();
+    let names: Vec<String> = beside.filter_map(|entry| entry.file_name().into_string().ok()).collect();
+    let written = path.file_name().map_or(String::new(), |name| name.to_string_lossy().into_owned());
+    let near = nearest(&written, names.iter().map(String::as_str));
+    let near = near.map(|name| path.with_file_name(name).shown());
+    let hint = near.map_or(String::new(), |near| format!("; did you mean `{near}`?"));
+    Failure::usage(format!("there is no file `{}`{hint}", path.shown()))
 }
 
 /// The files that a source may name: those in its folder, or in the current one for standard input.

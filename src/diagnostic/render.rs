@@ -107,10 +107,13 @@ fn snippet<'a>(source: &'a Source, labels: &[(AnnotationKind, &'a Label)]) -> Sn
 }
 
 /// A part of a source with a sign in place of each character that a terminal would hide or obey. The renderer has signs
-/// of its own for the ASCII ones.
+/// of its own for the ASCII ones, and would show one at the end of each line that ends as on Windows.
 fn quoted(text: &str) -> Cow<'_, str> {
     let hidden = |c: char| is_hidden(c) && !c.is_ascii();
-    if text.contains(hidden) { text.replace(hidden, "\u{fffd}").into() } else { text.into() }
+    let text = text.strip_suffix('\r').unwrap_or(text);
+    let text: Cow<'_, str> =
+        if text.contains("\r\n") { text.replace("\r\n", "\n").into() } else { text.into() };
+    if text.contains(hidden) { text.replace(hidden, "\u{fffd}").into() } else { text }
 }
 
 /// The bytes of a span, moved onto character boundaries inside the text.

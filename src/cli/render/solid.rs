@@ -31,6 +31,9 @@ const MOST_PICTURES: f64 = 100_000.0;
 
 pub(super) fn run(shared: &Shared, options: &Render) -> Result<(), Failure> {
     let path = options.subject.as_path();
+    if path != Path::new("-") && !path.exists() {
+        return Err(input::missing(path));
+    }
     if let Some(flag) = options.flag_of_runs() {
         let (shown, folder) = (path.shown(), path.with_extension("out").shown());
         return Err(Failure::usage(format!(

@@ -60,6 +60,9 @@ pub(super) fn run(shared: &Shared, options: &View) -> Result<(), Failure> {
             }
         };
     }
+    if path != Path::new("-") && !path.exists() {
+        return Err(input::missing(path));
+    }
     if options.save.is_some() {
         let folder = path.with_extension("out");
         let (file, folder) = (path.shown(), folder.shown());

@@ -183,12 +183,20 @@ impl Mirrors {
         self.count[particles].iter().copied().max().unwrap_or(0).into()
     }
 
-    /// The planes as columns, for sums over pairs.
-    pub fn columns(&self) -> [&[f64]; COLUMNS] {
-        let [a, b, c] = &self.columns;
-        let [[ax, ay, az, ad], [bx, by, bz, bd], [cx, cy, cz, cd]] =
-            [a, b, c].map(|(Vectors { x, y, z }, distance)| [&x[..], y, z, distance]);
-        [ax, ay, az, ad, bx, by, bz, bd, cx, cy, cz, cd]
+    /// Columns for sums over pairs: those of a pass, and behind them those of the planes, which are the last [`COLUMNS`]
+    /// of them all.
+    pub fn columns_after<'a, const OWN: usize, const ALL: usize>(
+        &'a self,
+        own: [&'a [f64]; OWN],
+    ) -> [&'a [f64]; ALL] {
+        const { assert!(ALL == OWN + COLUMNS) };
+        let mut all: [&[f64]; ALL] = [&[]; ALL];
+        let (first, of_planes) = all.split_at_mut(OWN);
+        first.copy_from_slice(&own);
+        for (plane, (Vectors { x, y, z }, distance)) in of_planes.chunks_exact_mut(4).zip(&self.columns) {
+            plane.copy_from_slice(&[x, y, z, distance]);
+        }
+        all
     }
 
     /// The planes near a particle; `None` if no wall is near.

@@ -122,13 +122,13 @@ impl Tension {
         self.weight.resize(n, 0.0);
         let crowding = Crowding::of(parameters);
 
-        let images = self.mirrors.any().then(|| self.mirrors.columns());
+        let mirrors = self.mirrors.any().then_some(&self.mirrors);
 
         let pass = Normals { crowding, core };
         let (Vectors { x, y, z }, Vectors { x: dx, y: dy, z: dz }) = (&mut self.normal, &mut self.direction);
         let out = [&mut x[..], y, z, dx, dy, dz, &mut self.weight];
-        match images {
-            Some(planes) => core.sum(&WithImages::new(pass, &self.mirrors), planes, out),
+        match mirrors {
+            Some(mirrors) => core.sum(&WithImages::new(pass, mirrors), mirrors.columns_after([]), out),
             None => core.sum(&pass, [], out),
         }
 
@@ -138,11 +138,9 @@ impl Tension {
         let Vectors { x: dx, y: dy, z: dz } = &self.direction;
         let Vectors { x, y, z } = &mut self.force;
         let (direction, out) = ([&dx[..], dy, dz, &self.weight], [&mut x[..], y, z]);
-        match images {
-            Some([ax, ay, az, ad, bx, by, bz, bd, cx, cy, cz, cd]) => {
-                let [dx, dy, dz, weight] = direction;
-                let columns = [dx, dy, dz, weight, ax, ay, az, ad, bx, by, bz, bd, cx, cy, cz, cd];
-                core.sum(&WithImages::new(pass, &self.mirrors), columns, out);
+        match mirrors {
+            Some(mirrors) => {
+                core.sum(&WithImages::new(pass, mirrors), mirrors.columns_after(direction), out);
             }
             None => core.sum(&pass, direction, out),
         }
@@ -162,7 +160,7 @@ impl Tension {
 
     /// Whether one of these particles belongs to the surface.
     pub fn any_at_surface(&self, particles: Range<usize>) -> bool {
-        self.weight[particles].iter().any(|weight| *weight > 0.0)
+        any_at_surface(&self.weight, particles)
     }
 
     /// n of a particle near walls that mirror the fluid, 1/m, with its weight; `None` for others, and in the depth.
@@ -177,6 +175,11 @@ impl Tension {
             + 8 * self.weight.capacity()
             + self.mirrors.bytes()
     }
+}
+
+/// Whether one of some particles, which follow one another, has a weight at the surface.
+fn any_at_surface(weight: &[f64], particles: Range<usize>) -> bool {
+    weight[particles].iter().any(|weight| *weight > 0.0)
 }
 
 /// Columns of directions with their weights, and of planes.
@@ -378,8 +381,7 @@ impl PairPass<DIRECTED, 2, 3> for WithImages<'_, Curvature<'_>> {
 
     fn for_block(self, particles: Range<usize>) -> Self {
         // in the depth curvature does nothing
-        let is_deep = self.pass.weight[particles.clone()].iter().all(|weight| *weight == 0.0);
-        if is_deep { Self { count: 0, ..self } } else { self.in_block(particles) }
+        if any_at_surface(self.pass.weight, particles.clone()) { self.in_block(particles) } else { self }
     }
 
     fn reads(&self) -> usize {

@@ -32,7 +32,7 @@ pub(super) fn find(core: &mut Core, mirrors: &Mirrors) {
     let pass = Fullness { kernel, weight: kernel.weight * volume / whole, mirrors, count: 0 };
     let mut wet = std::mem::take(&mut core.wet);
     wet.resize(core.particles.len(), 0.0);
-    core.sum(&pass, mirrors.columns(), [&mut wet]);
+    core.sum(&pass, mirrors.columns_after([]), [&mut wet]);
     core.wet = wet;
 }
 

@@ -353,7 +353,7 @@ impl DivergenceFree {
         self.loaded.resize(density.len(), 0.0);
         let out = [&mut self.loaded[..], linear, barrier, x, y, z, &mut self.spread, &mut density];
         match self.walls.mirrors() {
-            Some(mirrors) => core.sum(&WithImages::new(pass, mirrors), mirrors.columns(), out),
+            Some(mirrors) => core.sum(&WithImages::new(pass, mirrors), mirrors.columns_after([]), out),
             None => core.sum(&pass, [], out),
         }
         core.particles.density = density;

@@ -240,9 +240,8 @@ impl Solver {
         let Vectors { x, y, z } = push;
         match walls.mirrors() {
             Some(mirrors) => {
-                let [ax, ay, az, ad, bx, by, bz, bd, cx, cy, cz, cd] = mirrors.columns();
-                let columns = [s, ax, ay, az, ad, bx, by, bz, bd, cx, cy, cz, cd];
-                core.sum(&WithImages::new(pass, mirrors), columns, [&mut x[..], y, z]);
+                let pass = WithImages::new(pass, mirrors);
+                core.sum(&pass, mirrors.columns_after([s]), [&mut x[..], y, z]);
             }
             None => core.sum(&pass, [s], [&mut x[..], y, z]),
         }
@@ -272,9 +271,8 @@ impl Solver {
         let Vectors { x, y, z } = velocity;
         match walls.mirrors() {
             Some(mirrors) => {
-                let [ax, ay, az, ad, bx, by, bz, bd, cx, cy, cz, cd] = mirrors.columns();
-                let columns = [&x[..], y, z, ax, ay, az, ad, bx, by, bz, bd, cx, cy, cz, cd];
-                core.sum(&WithImages::new(pass, mirrors), columns, [&mut self.rate]);
+                let pass = WithImages::new(pass, mirrors);
+                core.sum(&pass, mirrors.columns_after([&x[..], y, z]), [&mut self.rate]);
             }
             None => core.sum(&pass, [&x[..], y, z], [&mut self.rate]),
         }

@@ -57,10 +57,8 @@ impl<'a> Edges<'a> {
         let kernel = Wendland::new(core.parameters.support_radius);
         let steepness = core.parameters.volume_in_sums() * kernel.steepness;
         let pass = Compression { kernel, steepness, tension, mirrors, count: 0 };
-        let [ax, ay, az, ad, bx, by, bz, bd, cx, cy, cz, cd] = mirrors.columns();
         let (Vectors { x, y, z }, Vectors { x: wx, y: wy, z: wz }) = (velocity, &mirrors.velocity);
-        let columns = [&x[..], y, z, wx, wy, wz, ax, ay, az, ad, bx, by, bz, bd, cx, cy, cz, cd];
-        core.sum(&pass, columns, [compression]);
+        core.sum(&pass, mirrors.columns_after([&x[..], y, z, wx, wy, wz]), [compression]);
         Some(Self { tension, compression })
     }
 
