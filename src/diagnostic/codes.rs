@@ -384,7 +384,8 @@ in what the fluid feels: a lid that moves takes a fluid that sticks to both alon
 wall at the same place is at rest. Let the box or the container reach beyond the obstacle, so that this alone is the
 wall there.";
 SLOW_SOUND = "W0520":
-"`sound_speed` is stated, and the fluid may become faster than a fifth of it. A weakly compressible fluid changes its density
+"`sound_speed` is stated, and the fluid may become faster than a fifth of it; or in a run, more than one particle in a thousand was
+faster than 0.4 of the speed of sound, stated or derived, as where a piston presses water through a hole. A weakly compressible fluid changes its density
 by about the square of its speed over that of sound: 1 % at a tenth, 5 % at more than a fifth. Beyond, it is a gas, and what is
 found is not that of a liquid. Left out, the speed of sound is ten times the greatest expected speed u, or with surface tension σ
 ten times √(u² + σ/ρa), with the spacing a, or in a creeping flow 10√(10νu/a).";

@@ -31,7 +31,7 @@ use super::error::StepError;
 use super::methods::Noted;
 use super::params::Parameters;
 use super::particles::CHUNK;
-use crate::geom::Aabb;
+use crate::geom::{Aabb, significant};
 
 /// The least energy at the start that is judged, in units of Σm·(expected speed)².
 const LEAST_ENERGY: f64 = 1e-9;
@@ -73,6 +73,13 @@ const MOST_VOLUME_CHANGE: f64 = 0.02;
 
 /// A mean compression above this is a finding, in units of the one that the method is to keep.
 const MOST_COMPRESSION: f64 = 10.0;
+
+/// Particles faster than this part of the speed of sound count as a gas. The tips of splashes reach a fifth to a quarter of
+/// it, if it is derived.
+const MOST_MACH: f64 = 0.4;
+
+/// More of them than this part of all are a finding.
+const MOST_TOO_FAST: f64 = 1e-3;
 
 /// The error of the work of walls with methods that know it roughly, as a part of it.
 const ROUGHNESS: f64 = 0.1;
@@ -128,10 +135,12 @@ pub struct Audit {
     volume_change: f64,
     compression: Compression,
     max_speed: f64,
+    /// The greatest part of the particles that was faster than [`MOST_MACH`] at once.
+    too_fast: f64,
     /// The figures of the last look.
     now: Instant,
     /// Which findings have been reported, in the order of [`Finding::ALL`].
-    told: [bool; 3],
+    told: [bool; 4],
 }
 
 /// The figures of one look.
@@ -152,10 +161,12 @@ pub enum Finding {
     Volume,
     /// The fluid is compressed far more than the method is to allow.
     Compression,
+    /// The fluid is as fast as a gas, for its speed of sound.
+    Speed,
 }
 
 impl Finding {
-    const ALL: [Self; 3] = [Self::Energy, Self::Volume, Self::Compression];
+    const ALL: [Self; 4] = [Self::Energy, Self::Volume, Self::Compression, Self::Speed];
 }
 
 /// A sum over all particles at one instant.
@@ -171,6 +182,8 @@ struct Sums {
     /// Sum of what the field pulls with, m/s².
     pull: f64,
     fastest: f64,
+    /// Number of particles faster than [`MOST_MACH`].
+    too_fast: usize,
 }
 
 impl Sums {
@@ -178,6 +191,7 @@ impl Sums {
     fn of(core: &Core, dt: f64) -> Self {
         let (method, scales) = (core.parameters.method.numerics(), core.parameters.scales());
         let is_staggered = method.is_staggered();
+        let limit = greatest_speed(&core.parameters).map_or(f64::INFINITY, |speed| speed.powi(2));
         let position = core.particles.position.components().map(|c| c.par_chunks(CHUNK));
         let velocity = core.particles.velocity.components().map(|c| c.par_chunks(CHUNK));
         let [x, y, z] = position;
@@ -194,6 +208,7 @@ impl Sums {
                     let square = u[k] * u[k] + v[k] * v[k] + w[k] * w[k];
                     sums.squares += square;
                     sums.fastest = sums.fastest.max(square);
+                    sums.too_fast += usize::from(square > limit);
                     sums.places += DVec3::new(x[k], y[k], z[k]);
                 }
                 sums.elastic = method.elastic_energies(&scales, density);
@@ -219,6 +234,7 @@ impl Sums {
             power_before: a.power_before + b.power_before,
             pull: a.pull + b.pull,
             fastest: a.fastest.max(b.fastest),
+            too_fast: a.too_fast + b.too_fast,
         };
         let sum = sums.into_iter().fold(Self::default(), add);
         Self { fastest: sum.fastest.sqrt(), ..sum }
@@ -262,8 +278,9 @@ impl Audit {
             volume_change: 0.0,
             compression,
             max_speed: sums.fastest,
+            too_fast: sums.too_fast as f64 / n,
             now: Instant { compression, speed: sums.fastest, ..Instant::default() },
-            told: [false; 3],
+            told: [false; 4],
         }
     }
 
@@ -304,6 +321,7 @@ impl Audit {
         (self.places, self.power) = (sums.places, power);
         self.liveliest = self.liveliest.max(0.5 * mass * sums.squares);
         (self.now.speed, self.max_speed) = (sums.fastest, self.max_speed.max(sums.fastest));
+        self.too_fast = self.too_fast.max(sums.too_fast as f64 / core.particles.len() as f64);
         if self.unjudged.is_none() {
             let energy = mass * (0.5 * sums.squares + sums.elastic);
             let gained = energy - self.at_start - (self.work - to_come);
@@ -418,9 +436,9 @@ impl Audit {
         vec![excess, volume_change, mean, p99, largest, speed]
     }
 
-    /// What a user must know about the run so far, each finding with a sentence. `kept` is the compression
-    /// that the method is to keep, if it promises any.
-    pub fn findings(&self, kept: Option<f64>) -> Vec<(Finding, String)> {
+    /// What a user must know about the run so far, each finding with a sentence.
+    pub(super) fn findings(&self, parameters: &Parameters) -> Vec<(Finding, String)> {
+        let kept = parameters.kept_compression();
         let percent = |x: f64| 100.0 * x;
         let energy = self.energy_excess().and_then(|excess| {
             let gained = excess * self.reference;
@@ -467,19 +485,38 @@ impl Audit {
         });
         Finding::ALL
             .into_iter()
-            .zip([energy, volume, compression])
+            .zip([energy, volume, compression, self.gas(parameters)])
             .filter_map(|(f, t)| Some((f, t?)))
             .collect()
     }
 
+    /// The sentence about a fluid that is as fast as a gas.
+    fn gas(&self, parameters: &Parameters) -> Option<String> {
+        (self.too_fast > MOST_TOO_FAST).then(|| {
+            let (sound, speed) = (significant(parameters.sound_speed()), significant(self.max_speed));
+            let derived = if parameters.states_sound_speed() { "" } else { " derived" };
+            let wanted = (10.0 * self.max_speed).ceil();
+            format!(
+                "the fluid reached {speed} m/s, with a{derived} speed of sound of {sound} m/s: there it is a gas, and its \
+                 forces are not those of a liquid; state `sound_speed: {wanted} m/s`"
+            )
+        })
+    }
+
     /// Returns the findings that were not reported before, and marks them as reported.
-    pub fn news(&mut self, kept: Option<f64>) -> Vec<(Finding, String)> {
-        let found = self.findings(kept);
+    pub(super) fn news(&mut self, parameters: &Parameters) -> Vec<(Finding, String)> {
+        let found = self.findings(parameters);
         found
             .into_iter()
             .filter(|(finding, _)| !std::mem::replace(&mut self.told[*finding as usize], true))
             .collect()
     }
+}
+
+/// The speed above which the fluid is a gas, m/s; `None` if the method does not stand for a liquid by its sound.
+fn greatest_speed(parameters: &Parameters) -> Option<f64> {
+    let is_weakly_compressible = parameters.walls_have_density() && !parameters.keeps_density();
+    is_weakly_compressible.then(|| MOST_MACH * parameters.sound_speed())
 }
 
 /// The energy of a fluid's height, J: that of its fall to the lowest corner of the box. A field of gravity

@@ -194,12 +194,12 @@ impl Simulation {
 
     /// Findings about the simulation so far that a user must know, each with a sentence.
     pub fn findings(&self) -> Vec<(Finding, String)> {
-        self.audit.findings(self.core.parameters.kept_compression())
+        self.audit.findings(&self.core.parameters)
     }
 
     /// The findings that this function has not returned before.
     pub fn news(&mut self) -> Vec<(Finding, String)> {
-        self.audit.news(self.core.parameters.kept_compression())
+        self.audit.news(&self.core.parameters)
     }
 
     /// The parameters. Gravity is that of the present step.

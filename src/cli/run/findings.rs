@@ -12,6 +12,7 @@ pub(super) fn code(finding: Finding) -> Code {
         Finding::Energy => Code::ENERGY_GREW,
         Finding::Volume => Code::VOLUME_CHANGED,
         Finding::Compression => Code::COMPRESSED,
+        Finding::Speed => Code::SLOW_SOUND,
     }
 }
 

@@ -99,9 +99,7 @@ impl Means {
         let figures = self.columns.iter().zip(&self.mean).zip(&self.error).take(self.shown);
         for (k, ((column, mean), error)) in figures.enumerate() {
             let mean = mean.unwrap_or(f64::NAN);
-            let (name, unit) = column.split_once(" [").unwrap_or((column, ""));
-            let unit = unit.trim_end_matches(']');
-            let unit = if unit == "1" { String::new() } else { format!(" {unit}") };
+            let (name, unit) = name_and_unit(column);
             let separator = if k == 0 { "" } else { "," };
             line += &match error {
                 Some(error) => {
@@ -116,7 +114,10 @@ impl Means {
         }
         if let Some(deviation) = self.deviation {
             line += &match self.known.iter().all(|known| *known == 0.0) {
-                true => format!("; {deviation:.2e} from what is known"),
+                true => {
+                    let unit = self.columns.first().map_or(String::new(), |column| name_and_unit(column).1);
+                    format!("; {}{unit} from what is known", alone(deviation))
+                }
                 false => format!("; {:.2} % from what is known", 100.0 * deviation),
             };
         }
@@ -125,6 +126,13 @@ impl Means {
         }
         line
     }
+}
+
+/// The name of a column, and its unit with a space before it, if it has one.
+fn name_and_unit(column: &str) -> (&str, String) {
+    let (name, unit) = column.split_once(" [").unwrap_or((column, ""));
+    let unit = unit.trim_end_matches(']');
+    (name, if unit.is_empty() || unit == "1" { String::new() } else { format!(" {unit}") })
 }
 
 /// Sizes of values that are written without an exponent.
@@ -204,7 +212,7 @@ mod tests {
         let probe = Probe::Height { x: 0.0, y: 0.0 };
         let means = Means::of("h", &probe, &AskedMean { from: 0.0, known: vec![0.0], torque: false }, &rows);
         assert_eq!((means.mean[0], means.deviation), (Some(7.0), Some(7.0)));
-        assert!(means.line().ends_with("; 7.00e0 from what is known"), "{}", means.line());
+        assert!(means.line().ends_with("; 7.0000 m from what is known"), "{}", means.line());
     }
 
     #[test]

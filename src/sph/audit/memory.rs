@@ -29,6 +29,7 @@ impl Audit {
             p99,
             largest,
             self.max_speed,
+            self.too_fast,
             self.liveliest,
             self.given,
             self.supplied,
@@ -63,6 +64,7 @@ impl Audit {
                 p99,
                 largest,
                 max_speed,
+                too_fast,
                 liveliest,
                 given,
                 supplied,
@@ -76,7 +78,7 @@ impl Audit {
                 speed,
                 told @ ..,
             ],
-        ) = <[f64; 32]>::try_from(memory)
+        ) = <[f64; 34]>::try_from(memory)
         else {
             return;
         };
@@ -103,6 +105,7 @@ impl Audit {
             volume_change,
             compression: Compression { mean, p99, largest },
             max_speed,
+            too_fast,
             now: Instant {
                 excess: excess_now,
                 volume_change: volume_now,

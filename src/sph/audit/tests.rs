@@ -27,7 +27,10 @@ fn parameters(method: Method, spacing: f64) -> Parameters {
 
 /// A column of water in a closed tank, that falls over.
 fn column(method: Method, spacing: f64) -> Simulation {
-    let parameters = parameters(method, spacing);
+    column_of(parameters(method, spacing), spacing)
+}
+
+fn column_of(parameters: Parameters, spacing: f64) -> Simulation {
     let mut fluid = crate::sph::Particles::default();
     let count = |length: f64| (length / spacing).round() as usize;
     for (i, j, k) in (0..count(0.4))
@@ -82,6 +85,17 @@ fn water_in_the_tank_keeps_its_volume() {
     let change = simulation.audit().volume_change();
     assert!(change.abs() < 0.01, "{change}");
     assert_eq!(simulation.findings(), []);
+}
+
+#[test]
+fn a_fluid_as_fast_as_a_gas_is_told_of() {
+    // nobody expected a fall of 0.8 m
+    let slow = Parameters { expected_speed: 0.4, ..parameters(Wcsph::default().into(), 0.1) };
+    let mut simulation = column_of(slow, 0.1);
+    simulation.advance(0.4, |_| std::ops::ControlFlow::Continue(())).unwrap();
+    let found = simulation.findings();
+    let told = found.iter().find(|(finding, _)| *finding == Finding::Speed).map(|(_, text)| text.as_str());
+    assert!(told.is_some_and(|text| text.contains("a derived speed of sound of 4 m/s")), "{found:?}");
 }
 
 #[test]
