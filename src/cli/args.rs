@@ -8,9 +8,10 @@ use clap_complete::Shell;
 
 use super::mesh::{ascii_help, format_name, output_help, unit_help, unit_name};
 use super::render::Surface;
+use super::scenery::Viewpoint;
 use super::shared::Shared;
 use super::sweep::options::{Again, SweepOptions};
-pub(super) use super::values::{CameraFlag, CutFlag};
+pub(super) use super::values::CutFlag;
 use super::values::{
     Deny, Frames, Tolerance, aabb, camera, cut, deny, frames, length, plane, point, seconds, steps,
     tolerance, window,
@@ -406,7 +407,7 @@ pub(super) struct Run {
     /// Direction from the scene to the eye in pictures; also as the viewer copies it [default: the scene's, or
     /// 0.48,-1,0.46]
     #[arg(long, help_heading = "Pictures", value_name = "X,Y,Z", value_parser = camera, allow_hyphen_values = true)]
-    pub camera: Option<CameraFlag>,
+    pub camera: Option<Viewpoint>,
     /// Cut obstacles open at a plane, the side towards the eye being taken away; `auto` cuts those that hide much of
     /// the fluid where it begins, `none` none [default: the scene's, or auto]
     #[arg(long, help_heading = "Pictures", value_name = "AXIS=VALUE|auto|none", value_parser = cut)]

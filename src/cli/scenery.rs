@@ -5,7 +5,7 @@ use glam::{BVec3, DVec3};
 use super::failure::{Failure, note};
 use rfm::geom::{Aabb, significant};
 use rfm::mesh::{Mesh, split_creases};
-use rfm::render::{self, Backdrop, Camera, Cut, Legend, Material, MeshView};
+use rfm::render::{self, Backdrop, Camera, Cut, Legend, Material, MeshView, Projection};
 use rfm::slice::Plane;
 
 /// An obstacle that hides more than this part of the fluid at its start is in the way.
@@ -24,19 +24,29 @@ pub(super) enum Drawn {
     Hidden,
 }
 
-/// From where a picture of a box is seen: the whole of it from the front, right and above unless stated otherwise.
-pub(super) fn camera(
-    domain: &Aabb,
-    towards_eye: Option<DVec3>,
-    (look_at, zoom): (Option<DVec3>, Option<f64>),
-    size: (u32, u32),
-) -> Result<Camera, Failure> {
-    let camera = match towards_eye {
-        Some(towards_eye) => Camera::new(domain, towards_eye, size),
-        None => Camera::three_quarter(domain, size),
-    };
-    let camera = camera.map_err(Failure::usage)?;
-    Ok(match (look_at, zoom) {
+/// From where a box is seen, as far as something states it.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub(super) struct Viewpoint {
+    /// The direction to the eye; `None`: from the front, right and above.
+    pub towards_eye: Option<DVec3>,
+    /// The place in the middle, m; `None`: that of the box.
+    pub look_at: Option<DVec3>,
+    /// How many times as large as if the whole box were seen.
+    pub zoom: Option<f64>,
+    pub projection: Projection,
+}
+
+/// The projection that a scene states.
+pub(super) fn projection(parallel: bool) -> Projection {
+    if parallel { Projection::Parallel } else { Projection::Perspective }
+}
+
+/// The camera of a picture of a box.
+pub(super) fn camera(domain: &Aabb, from: Viewpoint, size: (u32, u32)) -> Result<Camera, Failure> {
+    // a direction without a length stands for the usual one
+    let towards_eye = from.towards_eye.unwrap_or(DVec3::ZERO);
+    let camera = Camera::new(domain, towards_eye, from.projection, size).map_err(Failure::usage)?;
+    Ok(match (from.look_at, from.zoom) {
         (None, None) => camera,
         (at, zoom) => camera.aimed(at.unwrap_or(domain.centre()), zoom.unwrap_or(1.0)),
     })

@@ -17,6 +17,8 @@ pub(super) struct Stated {
     /// The place in the middle, m.
     pub look_at: Option<[f64; 3]>,
     pub zoom: Option<f64>,
+    /// Whether lines that are parallel stay so.
+    pub parallel: bool,
     pub cut: StatedCut,
     /// The speed at the end of the colours, m/s.
     pub fastest: Option<f64>,
@@ -74,6 +76,7 @@ impl Stated {
             camera: picture.camera.map(|camera| camera.to_array()),
             look_at: picture.look_at.map(|at| at.to_array()),
             zoom: picture.zoom,
+            parallel: picture.parallel,
             cut,
             fastest: picture.fastest,
             hide: picture.hide.clone(),
@@ -86,7 +89,7 @@ impl Stated {
         self.zoom.filter(|zoom| Picture::ZOOMS.contains(zoom))
     }
 
-    /// How a page begins that shows the scene. It has one look for all obstacles.
+    /// How a page begins that shows the scene.
     pub fn outset(&self) -> Outset {
         let cut = match self.cut {
             StatedCut::Auto | StatedCut::None => None,
@@ -96,12 +99,14 @@ impl Stated {
             camera: self.camera.filter(|camera| *camera != [0.0; 3]),
             look_at: self.look_at,
             zoom: self.zoom(),
+            parallel: self.parallel,
             cut,
             obstacle: match self.cut {
-                _ if !self.glass.is_empty() => Some("transparent"),
                 StatedCut::Auto => None,
                 StatedCut::None | StatedCut::Half { .. } => Some("opaque"),
             },
+            hide: self.hide.clone(),
+            glass: self.glass.clone(),
         }
     }
 }

@@ -3,10 +3,13 @@
 use std::num::NonZeroUsize;
 
 use glam::DVec3;
+
+use super::scenery::Viewpoint;
 use rfm::diagnostic::{Diagnostic, explain};
 use rfm::geom::Aabb;
 use rfm::lower::Picture;
 use rfm::quantity::{Dimension, parse_quantity};
+use rfm::render::Projection;
 use rfm::slice::{Axis, Plane};
 
 /// How far a simplified mesh may be from the surface.
@@ -166,23 +169,15 @@ pub(super) fn point(text: &str) -> Result<DVec3, String> {
     numbers::<3>(text).map(DVec3::from_array)
 }
 
-/// From where a picture is seen.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct CameraFlag {
-    /// The direction to the eye.
-    pub towards_eye: DVec3,
-    pub look_at: Option<DVec3>,
-    pub zoom: Option<f64>,
-}
-
 /// Three numbers that are not all zero; or what a scene states and the viewer copies:
-/// `picture { camera: [0.5, -1, 0.4], look_at: [1, 1, 0.5], zoom: 2 }`.
-pub(super) fn camera(text: &str) -> Result<CameraFlag, String> {
+/// `picture { camera: [0.5, -1, 0.4], look_at: [1, 1, 0.5], zoom: 2, projection: parallel }`.
+pub(super) fn camera(text: &str) -> Result<Viewpoint, String> {
+    const KEYS: &str = "expected camera, look_at, zoom or projection";
     let bare = |text: &str| {
         let text = text.trim();
         point(text.strip_prefix('[').and_then(|rest| rest.strip_suffix(']')).unwrap_or(text))
     };
-    let (mut towards_eye, mut look_at, mut zoomed) = (None, None, None);
+    let (mut towards_eye, mut look_at, mut zoomed, mut projected) = (None, None, None, None);
     if text.contains(':') {
         let entries = text.trim().strip_prefix("picture").map_or(text, str::trim);
         let entries = entries.strip_prefix('{').and_then(|rest| rest.strip_suffix('}')).unwrap_or(entries);
@@ -199,9 +194,8 @@ pub(super) fn camera(text: &str) -> Result<CameraFlag, String> {
                 "camera" => towards_eye.replace(bare(value)?).is_some(),
                 "look_at" => look_at.replace(bare(value)?).is_some(),
                 "zoom" => zoomed.replace(zoom(value)?).is_some(),
-                other => {
-                    return Err(format!("`{other}` is no key of a camera; expected camera, look_at or zoom"));
-                }
+                "projection" => projected.replace(projection(value)?).is_some(),
+                other => return Err(format!("`{other}` is no key of a camera; {KEYS}")),
             };
             if is_repeated {
                 return Err(format!("`{key}` is stated twice"));
@@ -209,7 +203,7 @@ pub(super) fn camera(text: &str) -> Result<CameraFlag, String> {
             rest = next.trim_start().strip_prefix(',').unwrap_or(next).trim_start();
         }
         if !rest.trim().is_empty() {
-            return Err(format!("`{}` has no key; expected camera, look_at or zoom", rest.trim()));
+            return Err(format!("`{}` has no key; {KEYS}", rest.trim()));
         }
     } else {
         towards_eye = Some(bare(text)?);
@@ -222,7 +216,17 @@ pub(super) fn camera(text: &str) -> Result<CameraFlag, String> {
     if look_at.is_some_and(|at: DVec3| !at.is_finite()) {
         return Err("`look_at` must be finite".into());
     }
-    Ok(CameraFlag { towards_eye, look_at, zoom: zoomed })
+    let projection = projected.unwrap_or_default();
+    Ok(Viewpoint { towards_eye: Some(towards_eye), look_at, zoom: zoomed, projection })
+}
+
+/// The word for a projection, as a scene states it.
+fn projection(text: &str) -> Result<Projection, String> {
+    match text.trim() {
+        "perspective" => Ok(Projection::Perspective),
+        "parallel" => Ok(Projection::Parallel),
+        other => Err(format!("`{other}` is no projection; expected perspective or parallel")),
+    }
 }
 
 /// Width and height in pixels: `1280x720`.
@@ -334,14 +338,17 @@ mod tests {
 
     #[test]
     fn cameras_are_read_as_the_viewer_copies_them() {
-        let towards_eye = DVec3::new(0.42, -0.9, 0.1);
-        let expected = Ok(CameraFlag { towards_eye, look_at: None, zoom: None });
+        let towards_eye = Some(DVec3::new(0.42, -0.9, 0.1));
+        let expected = Ok(Viewpoint { towards_eye, ..Viewpoint::default() });
         for text in ["0.42,-0.9,0.1", "[0.42, -0.9, 0.1]", "picture { camera: [0.42, -0.9, 0.1] }"] {
             assert_eq!(camera(text), expected, "{text}");
         }
         let whole = "picture { camera: [0.42, -0.9, 0.1], look_at: [1, 2, -3], zoom: 2.5 }";
         let look_at = Some(DVec3::new(1.0, 2.0, -3.0));
-        assert_eq!(camera(whole), Ok(CameraFlag { towards_eye, look_at, zoom: Some(2.5) }));
+        let seen = Viewpoint { towards_eye, look_at, zoom: Some(2.5), projection: Projection::Perspective };
+        assert_eq!(camera(whole), Ok(seen));
+        let parallel = whole.replace(" }", ", projection: parallel }");
+        assert_eq!(camera(&parallel), Ok(Viewpoint { projection: Projection::Parallel, ..seen }));
         for text in [
             "0,0,0",
             "cut: [1, 0, 0]",
@@ -353,6 +360,7 @@ mod tests {
             "camera: [1, 0, 0], look_at: [nan, 0, 0]",
             "camera: [1, 0, 0] zoom",
             "camera: [1, 0, 0], camera: [0, 1, 0]",
+            "camera: [1, 0, 0], projection: flat",
         ] {
             assert!(camera(text).is_err(), "{text}");
         }

@@ -337,7 +337,7 @@ mod tests {
 
     use super::*;
     use crate::field::Points;
-    use crate::render::ColourMap;
+    use crate::render::{ColourMap, Projection};
 
     const MOMENT: Caption = Caption { time: 0.0, every: 0.0, step: None };
     const LEGEND: Legend<'_> = Legend {
@@ -357,7 +357,7 @@ mod tests {
 
     /// A view of the cube along −x, with y to the right and z up.
     fn scene(mesh: MeshView<'_>) -> Backdrop {
-        let camera = Camera::new(&cube(), DVec3::X, (320, 240)).unwrap();
+        let camera = Camera::new(&cube(), DVec3::X, Projection::Perspective, (320, 240)).unwrap();
         Backdrop::new(camera, &cube(), &[mesh], &LEGEND).unwrap()
     }
 
@@ -434,7 +434,8 @@ mod tests {
     fn what_moves_is_drawn_like_what_stands_still_in_any_order() {
         let (near, far, none) = (sheet_at(0.4), sheet_at(-0.4), [0.0; 0]);
         let moment = |meshes: &[MeshView<'_>], still: &[MeshView<'_>]| {
-            let camera = Camera::new(&cube(), DVec3::new(1.0, 0.3, 0.4), (320, 240)).unwrap();
+            let camera =
+                Camera::new(&cube(), DVec3::new(1.0, 0.3, 0.4), Projection::Perspective, (320, 240)).unwrap();
             let scene = Backdrop::new(camera, &cube(), still, &LEGEND).unwrap();
             let particles =
                 ParticlesView { positions: Points::new(&none, &none, &none), values: &[], radius: 0.1 };

@@ -1,7 +1,8 @@
-//! The view: a mild perspective that shows the whole box, with z upwards.
+//! The view: a mild perspective, or parallel lines, that show the whole box, with z upwards.
 //!
-//! Screen coordinates are sub-pixels, two per pixel each way, with x to the right and y down. Nearness is the
-//! inverse of the depth along the view, so it is linear on the screen along lines and planes.
+//! Screen coordinates are sub-pixels, two per pixel each way, with x to the right and y down. Nearness is linear on the
+//! screen along lines and planes: in a perspective the inverse of the depth along the view, and among parallel lines
+//! the tangent to that at the distance D of the box's middle, (2D − depth)/D².
 
 use glam::{DVec2, DVec3};
 
@@ -14,8 +15,23 @@ pub(super) const SUBPIXELS: usize = 2;
 /// The distance of the eye from the centre of the box, in diagonals of the box. Parallel lines stay
 /// nearly parallel.
 const DISTANCE: f64 = 3.0;
+
+/// The same where lines are parallel. It does not change what is seen; the larger it is, the more even the nearness, and
+/// the less of it a single precision tells apart.
+const PARALLEL_DISTANCE: f64 = 12.0;
+
 /// The margins around the box in a picture 960 high: left, top, right (colour bar), bottom (caption).
 const MARGINS: [f64; 4] = [48.0, 56.0, 150.0, 72.0];
+
+/// How lines that are parallel in space are drawn.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Projection {
+    /// They meet far away: what is nearer is larger.
+    #[default]
+    Perspective,
+    /// They stay parallel: lengths across the view can be measured in the picture.
+    Parallel,
+}
 
 /// A view of a box.
 #[derive(Debug, Clone, PartialEq)]
@@ -24,12 +40,15 @@ pub struct Camera {
     pub(super) width: u32,
     /// The picture's height in pixels.
     pub(super) height: u32,
+    /// The place of the eye. Among parallel lines it stands for their direction, and for where depth begins.
     eye: DVec3,
+    /// The distance of the eye from the middle of the box if lines are parallel; `None` in a perspective.
+    parallel: Option<f64>,
     right: DVec3,
     up: DVec3,
     /// The direction from the scene to the eye.
     back: DVec3,
-    /// Sub-pixels per unit length at depth one.
+    /// Sub-pixels per unit length at depth one, or at any depth times the distance of the eye.
     focal: f64,
     /// The point where the axis of the view meets the screen.
     centre: DVec2,
@@ -52,16 +71,22 @@ impl Camera {
     /// # Errors
     /// Those of [`Camera::new`].
     pub fn three_quarter(bounds: &Aabb, size: (u32, u32)) -> Result<Self, RenderError> {
-        Self::new(bounds, DVec3::new(0.48, -1.0, 0.46), size)
+        Self::new(bounds, DVec3::ZERO, Projection::Perspective, size)
     }
 
     /// A view of the whole box from the direction `towards_eye`, which may have any length. If it is zero or
-    /// not finite, the view is the three-quarter one. `size` is the picture's width and height in pixels.
+    /// not finite, the view is from the direction of the three-quarter one. `size` is the picture's width and height in
+    /// pixels.
     ///
     /// # Errors
     /// [`RenderError::Bounds`] for a box that is empty, infinite or a point; [`RenderError::Size`] for a
     /// picture with a side outside 16 ..= 8192.
-    pub fn new(bounds: &Aabb, towards_eye: DVec3, size: (u32, u32)) -> Result<Self, RenderError> {
+    pub fn new(
+        bounds: &Aabb,
+        towards_eye: DVec3,
+        projection: Projection,
+        size: (u32, u32),
+    ) -> Result<Self, RenderError> {
         let diagonal = bounds.size().length();
         if bounds.is_empty() || !diagonal.is_finite() || diagonal <= 0.0 {
             return Err(RenderError::Bounds(*bounds));
@@ -74,8 +99,13 @@ impl Camera {
         // in a view straight from above or below, y points up in the picture
         let right = DVec3::Z.cross(back).try_normalize().unwrap_or(DVec3::X);
         let up = back.cross(right);
-        let eye = bounds.centre() + DISTANCE * diagonal * back;
-        let mut camera = Self { width, height, eye, right, up, back, focal: 1.0, centre: DVec2::ZERO };
+        let (distance, parallel) = match projection {
+            Projection::Perspective => (DISTANCE * diagonal, None),
+            Projection::Parallel => (PARALLEL_DISTANCE * diagonal, Some(PARALLEL_DISTANCE * diagonal)),
+        };
+        let eye = bounds.centre() + distance * back;
+        let mut camera =
+            Self { width, height, eye, parallel, right, up, back, focal: 1.0, centre: DVec2::ZERO };
         camera.fit(bounds);
         Ok(camera)
     }
@@ -115,31 +145,51 @@ impl Camera {
     /// the eye.
     pub(super) fn look(&self, p: DVec3) -> Option<Seen> {
         let d = p - self.eye;
-        let nearness = 1.0 / -d.dot(self.back);
-        let at = self.centre + self.focal * nearness * DVec2::new(d.dot(self.right), -d.dot(self.up));
+        let depth = -d.dot(self.back);
+        let nearness = match self.parallel {
+            None => 1.0 / depth,
+            Some(distance) => (2.0 * distance - depth) / (distance * distance),
+        };
+        let at = self.centre + self.magnification(nearness) * DVec2::new(d.dot(self.right), -d.dot(self.up));
         (nearness > 0.0 && at.abs().max_element() < 1e6).then_some(Seen { at, nearness })
     }
 
     /// The point that is seen at a place on the screen with a nearness.
     pub(super) fn place(&self, at: DVec2, nearness: f64) -> DVec3 {
-        let depth = 1.0 / nearness;
-        let across = (at - self.centre) * (depth / self.focal);
+        let (depth, wide) = match self.parallel {
+            None => (1.0 / nearness, 1.0 / nearness),
+            Some(distance) => (distance * (2.0 - nearness * distance), distance),
+        };
+        let across = (at - self.centre) * (wide / self.focal);
         self.eye + across.x * self.right - across.y * self.up - depth * self.back
     }
 
-    /// The nearness of a plane as a function of the place on the screen: n = a + b·x + c·y. `None` if the eye
-    /// lies in the plane.
+    /// The nearness of a plane as a function of the place on the screen: n = a + b·x + c·y. `None` if the plane is seen
+    /// as a line.
     pub(super) fn nearness_of(&self, plane: &Cut) -> Option<[f64; 3]> {
         let ahead = plane.offset - plane.normal.dot(self.eye);
-        let normal = self.turn(plane.normal) / ahead;
-        let slope = DVec2::new(normal.x, -normal.y) / self.focal;
-        let found = [-normal.z - slope.dot(self.centre), slope.x, slope.y];
+        let normal = self.turn(plane.normal);
+        // normal·(a, b, −depth) = ahead, with a and b across the view
+        let (middle, slope) = match self.parallel {
+            None => {
+                let normal = normal / ahead;
+                (-normal.z, DVec2::new(normal.x, -normal.y) / self.focal)
+            }
+            Some(distance) => {
+                let slope = DVec2::new(-normal.x, normal.y) / (normal.z * distance * self.focal);
+                ((2.0 + ahead / (normal.z * distance)) / distance, slope)
+            }
+        };
+        let found = [middle - slope.dot(self.centre), slope.x, slope.y];
         found.iter().all(|part| part.is_finite()).then_some(found)
     }
 
     /// Whether the eye lies on the side of a plane that is cut away.
     pub fn is_beyond(&self, plane: &Cut) -> bool {
-        plane.normal.dot(self.eye) > plane.offset
+        match self.parallel {
+            None => plane.normal.dot(self.eye) > plane.offset,
+            Some(_) => plane.normal.dot(self.back) > 0.0,
+        }
     }
 
     /// The direction from the scene to the eye, of length 1.
@@ -152,14 +202,31 @@ impl Camera {
         DVec3::new(direction.dot(self.right), direction.dot(self.up), direction.dot(self.back))
     }
 
-    /// The vector from a point to the eye.
+    /// A vector from a point towards the eye.
     pub(super) fn to_eye(&self, p: DVec3) -> DVec3 {
-        self.eye - p
+        match self.parallel {
+            None => self.eye - p,
+            Some(distance) => distance * self.back,
+        }
     }
 
     /// Sub-pixels per unit length at a nearness.
     pub(super) fn magnification(&self, nearness: f64) -> f64 {
-        self.focal * nearness
+        self.focal * self.weight(nearness)
+    }
+
+    /// By how much the nearness grows per unit length towards the eye.
+    pub(super) fn growth(&self, nearness: f64) -> f64 {
+        let weight = self.weight(nearness);
+        weight * weight
+    }
+
+    /// What makes a quantity that is linear in space linear on the screen, as a factor.
+    pub(super) fn weight(&self, nearness: f64) -> f64 {
+        match self.parallel {
+            None => nearness,
+            Some(distance) => 1.0 / distance,
+        }
     }
 
     /// The numbers of columns and rows of sub-pixels.
@@ -208,7 +275,8 @@ mod tests {
 
     #[test]
     fn a_picture_is_as_high_as_the_viewer_takes_it_to_be() {
-        let camera = Camera::new(&cube(), DVec3::new(0.6, -0.64, 0.48), (1280, 720)).unwrap();
+        let camera =
+            Camera::new(&cube(), DVec3::new(0.6, -0.64, 0.48), Projection::Perspective, (1280, 720)).unwrap();
         let (low, high) = camera.room();
         let nearness = camera.look(DVec3::splat(1.5)).unwrap().nearness;
         let height = (high.y - low.y) / camera.magnification(nearness);
@@ -218,13 +286,56 @@ mod tests {
 
     #[test]
     fn lines_meet_as_in_the_viewer_however_large_things_are() {
-        let camera = Camera::new(&cube(), DVec3::new(0.6, -0.64, 0.48), (1280, 720)).unwrap();
+        let camera =
+            Camera::new(&cube(), DVec3::new(0.6, -0.64, 0.48), Projection::Perspective, (1280, 720)).unwrap();
         let near = camera.clone().aimed(DVec3::new(2.0, 1.0, 0.5), 5.0);
         for camera in [camera, near] {
             let nearness = |x: f64, y: f64, z: f64| camera.look(DVec3::new(x, y, z)).unwrap().nearness;
             let ratio = nearness(3.0, 0.0, 3.0) / nearness(0.0, 3.0, 0.0);
             // tests/viewer asks the page for the same figure
             assert!((ratio - 1.396_665_022_888_28).abs() < 1e-9, "{ratio}");
+        }
+    }
+
+    #[test]
+    fn both_projections_know_where_a_point_is_and_where_a_plane() {
+        for projection in [Projection::Perspective, Projection::Parallel] {
+            let camera = Camera::new(&cube(), DVec3::new(0.6, -0.64, 0.48), projection, (1280, 720)).unwrap();
+            let camera = camera.aimed(DVec3::new(2.0, 1.0, 0.5), 1.5);
+            let normal = DVec3::new(0.6, 0.0, 0.8);
+            let plane = Cut { normal, offset: normal.dot(DVec3::splat(1.5)) };
+            let [a, b, c] = camera.nearness_of(&plane).unwrap();
+            for k in 0..8 {
+                let p = DVec3::new(f64::from(k & 1), f64::from(k >> 1 & 1), f64::from(k >> 2)) * 2.5;
+                let seen = camera.look(p).unwrap();
+                assert!(camera.place(seen.at, seen.nearness).distance(p) < 1e-11);
+                let on_plane = p + (plane.offset - normal.dot(p)) / normal.z * DVec3::Z;
+                let seen = camera.look(on_plane).unwrap();
+                assert!((a + b * seen.at.x + c * seen.at.y - seen.nearness).abs() < 1e-14);
+                let step = 1e-6 * camera.towards_eye();
+                let nearer =
+                    camera.look(p + step).unwrap().nearness - camera.look(p - step).unwrap().nearness;
+                let growth = camera.growth(camera.look(p).unwrap().nearness);
+                assert!((nearer / 2e-6 / growth - 1.0).abs() < 1e-6);
+            }
+        }
+    }
+
+    #[test]
+    fn parallel_lines_stay_parallel_and_as_long() {
+        let camera =
+            Camera::new(&cube(), DVec3::new(0.6, -0.64, 0.48), Projection::Parallel, (1280, 720)).unwrap();
+        let edge = |from: DVec3| camera.look(from + DVec3::Z).unwrap().at - camera.look(from).unwrap().at;
+        for corner in cube().corners() {
+            assert!(edge(corner).distance(edge(DVec3::ZERO)) < 1e-9);
+        }
+        let (low, high) = camera.room();
+        let height = (high.y - low.y) / camera.magnification(1.0);
+        // tests/viewer asks the page for the same figure
+        assert!((height - 4.667_214_263_486).abs() < 1e-6, "{height}");
+        for corner in cube().corners() {
+            let at = camera.look(corner).unwrap().at;
+            assert!(at.cmpge(low - 1e-6).all() && at.cmple(high + 1e-6).all(), "{at}");
         }
     }
 
@@ -237,7 +348,7 @@ mod tests {
         assert!(matches!(Camera::three_quarter(&cube(), (0, 10)), Err(RenderError::Size(0, 10))));
         let flat = Aabb::new(DVec3::ZERO, DVec3::new(1.0, 1.0, 0.0));
         for towards_eye in [DVec3::Z, DVec3::NAN, DVec3::ZERO, DVec3::X] {
-            let camera = Camera::new(&flat, towards_eye, size).unwrap();
+            let camera = Camera::new(&flat, towards_eye, Projection::Perspective, size).unwrap();
             assert!(camera.look(DVec3::ZERO).is_some());
             assert!(camera.look(DVec3::NAN).is_none());
             assert!(camera.look(1e9 * camera.back).is_none(), "behind the eye");

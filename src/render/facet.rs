@@ -11,7 +11,7 @@ pub(super) struct Facet {
     pub vertices: [u32; 3],
     /// The normals in the camera's frame, towards the side that is seen.
     pub normals: [[f32; 3]; 3],
-    /// How far the corners lie beyond the cut, times their nearness. The product is linear on the screen.
+    /// How far the corners lie beyond the cut, with the weight by which this is linear on the screen.
     pub beyond: [f32; 3],
 }
 

@@ -219,13 +219,14 @@ fn means(values: impl Iterator<Item = f32> + Clone, reach: usize, mut take: impl
 mod tests {
     use super::*;
     use crate::field::Points;
+    use crate::render::Projection;
 
     fn cube() -> Aabb {
         Aabb::new(DVec3::ZERO, DVec3::splat(2.0))
     }
 
     fn above() -> Camera {
-        Camera::new(&cube(), DVec3::new(0.0, -0.4, 1.0), (320, 240)).unwrap()
+        Camera::new(&cube(), DVec3::new(0.0, -0.4, 1.0), Projection::Perspective, (320, 240)).unwrap()
     }
 
     /// The light at places of the floor below one ball.
@@ -283,7 +284,13 @@ mod tests {
             assert!((nearness - seen.nearness).abs() < 1e-12);
             assert!(camera.place(seen.at, nearness).distance(p) < 1e-9);
         }
-        assert!(Floor::new(&cube(), &Camera::new(&cube(), DVec3::NEG_Z, (320, 240)).unwrap()).is_none());
+        assert!(
+            Floor::new(
+                &cube(),
+                &Camera::new(&cube(), DVec3::NEG_Z, Projection::Perspective, (320, 240)).unwrap()
+            )
+            .is_none()
+        );
     }
 
     #[test]

@@ -27,7 +27,7 @@ pub fn hidden(camera: &Camera, mesh: &MeshView<'_>, points: &[DVec3]) -> f64 {
 mod tests {
     use super::*;
     use crate::geom::Aabb;
-    use crate::render::{Cut, Material, Rgb, shade};
+    use crate::render::{Cut, Material, Projection, Rgb, shade};
 
     /// A closed box as a mesh.
     fn block(low: DVec3, high: DVec3) -> (Vec<DVec3>, Vec<[u32; 3]>) {
@@ -39,7 +39,7 @@ mod tests {
     /// The middle of the picture of a box around the origin, seen from +x.
     fn seen(cut: Option<Cut>) -> (Rgb, f64) {
         let bounds = Aabb::new(DVec3::splat(-1.0), DVec3::ONE);
-        let camera = Camera::new(&bounds, DVec3::X, (320, 240)).unwrap();
+        let camera = Camera::new(&bounds, DVec3::X, Projection::Perspective, (320, 240)).unwrap();
         let (vertices, triangles) = block(DVec3::splat(-0.5), DVec3::splat(0.5));
         let mesh = MeshView { vertices: &vertices, triangles: &triangles, cut, ..MeshView::default() };
         let facets = Facets::new(&mesh, &camera, &Scale::speeds(1.0));
@@ -54,7 +54,13 @@ mod tests {
     #[test]
     fn a_cut_shows_the_inside_of_a_solid_where_it_lies() {
         let plane = |normal: DVec3, offset| Some(Cut { normal, offset });
-        let camera = Camera::new(&Aabb::new(DVec3::splat(-1.0), DVec3::ONE), DVec3::X, (320, 240)).unwrap();
+        let camera = Camera::new(
+            &Aabb::new(DVec3::splat(-1.0), DVec3::ONE),
+            DVec3::X,
+            Projection::Perspective,
+            (320, 240),
+        )
+        .unwrap();
         let at = |x: f64| camera.look(DVec3::new(x, 0.05, 0.08)).unwrap().nearness;
         let stone = seen(None);
         assert!((stone.1 - at(0.5)).abs() < 1e-6);
@@ -72,7 +78,7 @@ mod tests {
     #[test]
     fn points_behind_a_mesh_are_hidden_until_it_is_cut() {
         let bounds = Aabb::new(DVec3::splat(-1.0), DVec3::ONE);
-        let camera = Camera::new(&bounds, DVec3::X, (320, 240)).unwrap();
+        let camera = Camera::new(&bounds, DVec3::X, Projection::Perspective, (320, 240)).unwrap();
         let (vertices, triangles) = block(DVec3::splat(-0.5), DVec3::splat(0.5));
         let points = [DVec3::ZERO, DVec3::new(-0.9, 0.1, 0.1), DVec3::X, DVec3::Y];
         let share = |cut| {

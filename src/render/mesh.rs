@@ -75,8 +75,10 @@ impl Facets {
             let flat = || in_frame(outward.try_normalize().unwrap_or(DVec3::Z));
             let given = if smooth { [a, b, c].map(|i| turned[i]) } else { [Some(flat()); 3] };
             let normals = given.map(|normal| normal.unwrap_or_else(flat).map(|x| side * x));
-            let beyond =
-                |i: usize| mesh.cut.map_or(-1.0, |cut| (corners[i].nearness * cut.beyond(points[i])) as f32);
+            let beyond = |i: usize| {
+                let weight = camera.weight(corners[i].nearness);
+                mesh.cut.map_or(-1.0, |cut| (weight * cut.beyond(points[i])) as f32)
+            };
             let beyond = [0, 1, 2].map(beyond);
             let corners = corners.map(Corner::new);
             Some(Facet { corners, rows: Corner::rows(&corners), vertices: *triangle, normals, beyond })

@@ -41,7 +41,7 @@ use std::{fmt, io};
 use self::colour::Rgb;
 pub use self::{
     backdrop::{Backdrop, Moving},
-    camera::Camera,
+    camera::{Camera, Projection},
     colour::ColourMap,
     cut::Cut,
     film::Apng,

@@ -47,8 +47,8 @@ pub fn discs(particles: &ParticlesView<'_>, camera: &Camera, scale: &Scale, foun
             y: seen.at.y as f32,
             radius: (camera.magnification(seen.nearness) * radius).min(1e6) as f32,
             nearness: seen.nearness as f32,
-            // the derivative of 1/depth, because a ball is small beside its distance
-            bulge: (radius * seen.nearness * seen.nearness) as f32,
+            // a ball is small beside its distance
+            bulge: (radius * camera.growth(seen.nearness)) as f32,
             colour: scale.colour(value).map(f32::from),
         })
     };

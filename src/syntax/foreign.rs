@@ -313,6 +313,7 @@ pub fn key(word: &str) -> Option<&'static str> {
         "eye" | "view" | "look_from" | "viewpoint" => "camera",
         "target" | "lookat" | "focus" => "look_at",
         "magnification" | "magnify" => "zoom",
+        "ortho" | "orthographic" | "orthogonal" | "parallel" | "perspective" => "projection",
         "section" | "clip" | "slice" | "opening" => "cut",
         "invisible" | "hidden" | "without" => "hide",
         "transparent" | "translucent" | "transparency" => "glass",

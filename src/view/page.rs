@@ -207,6 +207,7 @@ pub fn solid(title: &str, mesh: &Mesh, out: &mut dyn Write) -> io::Result<()> {
         radius: 0.0,
         arrays: Vec::new(),
         solids: Vec::new(),
+        bodies: Vec::new(),
         gravity: None,
         params: Vec::new(),
         plots: None,

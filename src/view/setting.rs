@@ -29,6 +29,8 @@ pub struct Setting {
     pub arrays: Vec<Array>,
     /// The solids that a live page may show, the one that is shown first; none where they stand in a fluid's way.
     pub solids: Vec<String>,
+    /// The names of the obstacles, in the order of the parts of their mesh.
+    pub bodies: Vec<String>,
     /// Gravity, m/s², if it is constant.
     pub gravity: Option<[f64; 3]>,
     /// The params that a live page may change.
@@ -48,10 +50,16 @@ pub struct Outset {
     pub look_at: Option<[f64; 3]>,
     /// How many times as large as if the whole box were seen.
     pub zoom: Option<f64>,
+    /// Whether lines that are parallel stay so.
+    pub parallel: bool,
     /// The plane that opens the obstacles.
     pub cut: Option<OutsetCut>,
     /// The look of the obstacles, `opaque`, `transparent` or `hidden`; `None`: as they hide the fluid or not.
     pub obstacle: Option<&'static str>,
+    /// The names of obstacles that are not drawn.
+    pub hide: Vec<String>,
+    /// The names of obstacles that are drawn clear.
+    pub glass: Vec<String>,
 }
 
 /// A plane across an axis that opens what is drawn.

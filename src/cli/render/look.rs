@@ -4,7 +4,7 @@ use glam::DVec3;
 
 use super::options::Render;
 use crate::cli::failure::Failure;
-use crate::cli::scenery::{self, half_towards_eye};
+use crate::cli::scenery::{self, Viewpoint, half_towards_eye, projection};
 use crate::cli::stated::{Stated, StatedCut};
 use crate::cli::values::CutFlag;
 use rfm::geom::Aabb;
@@ -44,8 +44,13 @@ impl<'a> Look<'a> {
             return Err(Failure::usage("--look-at: expected three finite lengths"));
         }
         scenery::tell_of_aim(domain, options.look_at);
-        let zoom = options.zoom.or(stated.zoom());
-        scenery::camera(domain, vector(stated.camera), (look_at, zoom), options.size)
+        let viewpoint = Viewpoint {
+            towards_eye: vector(stated.camera),
+            look_at,
+            zoom: options.zoom.or(stated.zoom()),
+            projection: projection(stated.parallel || options.parallel),
+        };
+        scenery::camera(domain, viewpoint, options.size)
     }
 
     pub fn opened(&self, camera: &Camera) -> Opened {

@@ -8,8 +8,9 @@ use glam::DVec3;
 
 use super::film::{Kind, Target};
 use crate::cli::failure::Failure;
+use crate::cli::scenery::Viewpoint;
 use crate::cli::values::{
-    CameraFlag, CutFlag, Frames, camera, count, cut, frames, point, range, seconds, size, times, zoom,
+    CutFlag, Frames, camera, count, cut, frames, point, range, seconds, size, times, zoom,
 };
 use rfm::render::{ColourMap, Material};
 
@@ -61,13 +62,16 @@ pub(in crate::cli) struct Render {
     /// Direction from the scene to the eye; also as the viewer copies it, with the place in the middle and the size:
     /// "picture { camera: [0.5, -1, 0.4], look_at: [1, 1, 0.5], zoom: 2 }" [default: 0.48,-1,0.46]
     #[arg(long, value_name = "X,Y,Z", value_parser = camera, allow_hyphen_values = true)]
-    pub camera: Option<CameraFlag>,
+    pub camera: Option<Viewpoint>,
     /// The place in the middle of the picture [default: that of --camera, or the middle of the box]
     #[arg(long, value_name = "X,Y,Z", value_parser = point, allow_hyphen_values = true)]
     pub look_at: Option<DVec3>,
     /// How many times as large as if the whole box were seen [default: that of --camera, or 1]
     #[arg(long, value_name = "FACTOR", value_parser = zoom)]
     pub zoom: Option<f64>,
+    /// Keep parallel lines parallel, so that lengths across the view can be measured in the picture
+    #[arg(long)]
+    pub parallel: bool,
     /// Cut obstacles and the surface of the fluid open at a plane, the side towards the eye being taken away; `auto` cuts
     /// obstacles that hide much of the fluid of the first frame, `none` none [default: auto; of a solid none]
     #[arg(long, value_name = "AXIS=VALUE|auto|none", value_parser = cut)]

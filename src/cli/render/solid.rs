@@ -17,7 +17,7 @@ use rfm::Solid;
 use rfm::field::Points;
 use rfm::geom::Aabb;
 use rfm::mesh::Mesh;
-use rfm::render::{Backdrop, Camera, Caption, Image, Legend, Moving, ParticlesView};
+use rfm::render::{Backdrop, Camera, Caption, Image, Legend, Moving, ParticlesView, Projection};
 use rfm::solid::Bounds;
 
 /// Cells of the mesh along the longest side, unless others are asked for.
@@ -217,9 +217,12 @@ pub(super) fn camera(options: &Render, domain: &Aabb) -> Result<Camera, Failure>
     if options.look_at.is_some_and(|at| !at.is_finite()) {
         return Err(Failure::usage("--look-at: expected three finite lengths"));
     }
-    let flag = options.camera;
-    let look_at = options.look_at.or(flag.and_then(|flag| flag.look_at));
-    let zoom = options.zoom.or(flag.and_then(|flag| flag.zoom));
-    scenery::tell_of_aim(domain, look_at);
-    scenery::camera(domain, flag.map(|flag| flag.towards_eye), (look_at, zoom), options.size)
+    let mut viewpoint = options.camera.unwrap_or_default();
+    viewpoint.look_at = options.look_at.or(viewpoint.look_at);
+    viewpoint.zoom = options.zoom.or(viewpoint.zoom);
+    if options.parallel {
+        viewpoint.projection = Projection::Parallel;
+    }
+    scenery::tell_of_aim(domain, viewpoint.look_at);
+    scenery::camera(domain, viewpoint, options.size)
 }

@@ -11,11 +11,10 @@ use glam::DVec3;
 use rayon::prelude::*;
 
 use super::super::args::{CutFlag, Run};
-use super::super::values::CameraFlag;
 use super::super::{Failure, output};
 use crate::cli::output::Shown;
 use crate::cli::render::Surface;
-use crate::cli::scenery::{self, Drawn, half, out_of_the_way};
+use crate::cli::scenery::{self, Drawn, Viewpoint, half, out_of_the_way, projection};
 use rfm::experiment;
 use rfm::field::Walls;
 use rfm::fluid_surface::Reconstruction;
@@ -43,7 +42,7 @@ const FITTING: std::ops::Range<f64> = 0.5..1.2;
 /// Options of pictures, besides what the scene states.
 #[derive(Debug, Clone, Copy)]
 pub(in crate::cli) struct Look<'a> {
-    pub camera: Option<CameraFlag>,
+    pub camera: Option<Viewpoint>,
     pub cut: Option<&'a CutFlag>,
     pub hide: &'a [String],
     pub glass: &'a [String],
@@ -239,11 +238,13 @@ fn moving(domain: &Aabb, bodies: &[Body], meshes: &[Mesh]) -> Vec<(Drawn, Mesh)>
 /// The camera that the flags or the scene ask for.
 fn camera(look: Look<'_>, experiment: &Experiment, size: (u32, u32)) -> Result<Camera, Failure> {
     let stated = &experiment.scene().picture;
-    let (towards_eye, aim) = match look.camera {
-        Some(flag) => (Some(flag.towards_eye), (flag.look_at, flag.zoom)),
-        None => (stated.camera, (stated.look_at, stated.zoom)),
-    };
-    scenery::camera(&experiment.domain(), towards_eye, aim, size)
+    let viewpoint = look.camera.unwrap_or(Viewpoint {
+        towards_eye: stated.camera,
+        look_at: stated.look_at,
+        zoom: stated.zoom,
+        projection: projection(stated.parallel),
+    });
+    scenery::camera(&experiment.domain(), viewpoint, size)
 }
 
 /// The plane that the flags or the scene state for all that is drawn.

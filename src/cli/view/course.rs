@@ -11,7 +11,7 @@ use super::way::Way;
 use rfm::geom::Aabb;
 use rfm::mesh::{Mesh, split_creases};
 use rfm::sph::Simulation;
-use rfm::view::{Frame, FrameHead, Lattice, MeshRole, columns, pack_frame, pack_mesh, pack_parts};
+use rfm::view::{Frame, FrameHead, Lattice, MeshRole, columns, pack_frame, pack_parts};
 use rfm::{Experiment, Solid};
 
 /// Most particles of a scene that begins to run by itself.
@@ -248,7 +248,8 @@ fn mesh_at(bodies: &Bodies, time: f64, run: u64) -> Result<Vec<u8>, String> {
 
 /// The block of the meshes of all solids at a time, s.
 pub(super) fn packed(meshes: &[Mesh], time: f64, run: u64) -> Vec<u8> {
-    pack_mesh(&split_creases(&Mesh::joined(meshes)), time, run)
+    let sharp: Vec<Mesh> = meshes.iter().map(split_creases).collect();
+    pack_parts(&sharp, MeshRole::Solids, time, run)
 }
 
 impl Motion {

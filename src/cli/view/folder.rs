@@ -79,6 +79,7 @@ impl SavedRun {
                 .map(|(name, range)| Array::named(name, Some(colours(name, *range))))
                 .collect(),
             solids: Vec::new(),
+            bodies: figures.as_ref().map_or_else(Vec::new, |figures| figures.obstacles.clone()),
             gravity: None,
             params: Vec::new(),
             plots: Some(plots::saved(folder)),

@@ -283,6 +283,9 @@ impl Subject {
                 (Some(checked), None) => self.solids_to_choose(checked),
                 (Some(_) | None, _) => Vec::new(),
             },
+            bodies: flow.map_or_else(Vec::new, |flow| {
+                flow.experiment.bodies().iter().map(|body| body.solid.name().to_string()).collect()
+            }),
             gravity: scene.and_then(|scene| match &scene.gravity {
                 Gravity::Still(gravity) => Some(gravity.to_array()),
                 Gravity::Turning(_) | Gravity::Field(_) => None,

@@ -252,6 +252,8 @@ pub struct Picture {
     pub look_at: Option<DVec3>,
     /// How many times as large as if the whole box were seen; `None`: 1.
     pub zoom: Option<f64>,
+    /// Whether lines that are parallel stay so; otherwise what is nearer is larger.
+    pub parallel: bool,
     /// What is taken away of obstacles.
     pub cut: Opening,
     /// The speed at the end of the colours, m/s; `None`: one that follows from the scene.

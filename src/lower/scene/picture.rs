@@ -23,6 +23,8 @@ declare_keys! {
             "the place in the middle of the picture";
         ZOOM = "zoom", Number(Dimension::NONE, Bound::Positive), Is(1.0),
             "how many times as large as if the whole box were seen, 0.05 … 20";
+        PROJECTION = "projection", Words(&["perspective", "parallel"]), Text("perspective"),
+            "whether what is nearer is larger, or lines stay parallel, so that lengths across the view can be measured";
         CUT = "cut", Words(&["auto", "none"]), Text("auto"),
             "the part of the obstacles that is taken away: `y <= 0.5`, `auto` or `none`";
         FASTEST = "fastest", Number(Dimension::SPEED, Bound::Positive), Text("from the speeds that are expected, or at the end of a run from those of its frames if they differ much"),
@@ -59,6 +61,7 @@ impl<'a> Lowering<'a> {
             );
         }
         let zoom = self.zoom(&block)?;
+        let parallel = self.word_key(&block, &keys::PROJECTION, &[false, true], false)?;
         let cut = match block.setting(keys::CUT.name) {
             Some((_, value)) => self.opening(value)?,
             None => Opening::default(),
@@ -66,7 +69,7 @@ impl<'a> Lowering<'a> {
         let fastest = self.stated_number(&block, &keys::FASTEST)?;
         let hide = self.obstacles(&block, keys::HIDE.name, bodies)?;
         let glass = self.obstacles(&block, keys::GLASS.name, bodies)?;
-        Some(Picture { camera, look_at, zoom, cut, fastest, hide, glass })
+        Some(Picture { camera, look_at, zoom, parallel, cut, fastest, hide, glass })
     }
 
     /// Reads the names of obstacles: one, or a list of them.

@@ -79,7 +79,8 @@ class Camera {
     // places are rounded to a part of the box, which may be millimetres wide
     const digits = clamp(5 - Math.floor(Math.log10(Math.max(...sub(box.max, box.min)))), 0, 20);
     const numbers = (v, places) => `[${v.map((x) => Number(x.toFixed(places)) + 0).join(", ")}]`;
-    return `picture { camera: ${numbers(towards, 4)}, look_at: ${numbers(at, digits)}, zoom: ${Number(zoom.toPrecision(4))} }`;
+    const projection = this.parallel ? ", projection: parallel" : "";
+    return `picture { camera: ${numbers(towards, 4)}, look_at: ${numbers(at, digits)}, zoom: ${Number(zoom.toPrecision(4))}${projection} }`;
   }
 
   /** How large `rfm render` draws a box seen from a direction, in a picture of its usual size: the height in metres, about a
@@ -90,7 +91,7 @@ class Camera {
     const right = norm(cross([0, 0, 1], towards)) > 1e-12 ? unit(cross([0, 0, 1], towards)) : [1, 0, 0];
     const up = cross(towards, right);
     const eye = add(scale(add(min, max), 0.5), scale(towards, EYE * norm(sub(max, min))));
-    const depth = (p) => dot(sub(eye, p), towards);
+    const depth = (p) => (this.parallel ? 1 : dot(sub(eye, p), towards));
     const corners = [0, 1, 2, 3, 4, 5, 6, 7].map((i) => [0, 1, 2].map((axis) => ((i >> axis) & 1 ? max : min)[axis]));
     const seen = corners.map((p) => [right, up].map((axis) => dot(sub(p, eye), axis) / depth(p)));
     const extent = [0, 1].map((k) => Math.max(...seen.map((at) => at[k])) - Math.min(...seen.map((at) => at[k])));
@@ -145,12 +146,13 @@ class Camera {
 }
 
 /** What makes the picture of `rfm render` that of the viewer besides the camera, in words. `at` is where the cut is, m. */
-function besides({ cutting: { axis, solid, fluid }, obstacle, parallel }, at, hasSolid) {
+function besides({ cutting: { axis, solid, fluid }, obstacle, looks }, bodies, at, hasSolid) {
   const flags = [];
   if (axis !== "none" && (solid || fluid)) flags.push(`--cut ${axis}=${Number(at.toPrecision(4))}${fluid ? " --cut-fluid" : ""}`);
   else if (hasSolid) flags.push("--cut none");
-  if (hasSolid && obstacle !== "opaque") flags.push(obstacle === "hidden" ? "--hide NAME" : "--glass NAME");
-  return (flags.length ? `; beside it: ${flags.join(" ")}` : "") + (parallel ? "; pictures have a perspective, and not parallel lines" : "");
+  const alone = bodies.length ? looks.map((look, k) => [look, bodies[k]]) : [[hasSolid ? obstacle : "opaque", "NAME"]];
+  for (const [look, name] of alone) if (look !== "opaque") flags.push(`${look === "hidden" ? "--hide" : "--glass"} ${name}`);
+  return flags.length ? `; beside it: ${flags.join(" ")}` : "";
 }
 
 /** Listens to pointers on the canvas. `changed` is called after each change, `turns` says whether a drag turns the box. */

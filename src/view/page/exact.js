@@ -164,8 +164,8 @@ class ExactView {
   }
 
   /** Whether rays are marched; if the choice is automatic only where they are fast. */
-  isShown({ surface, obstacle, onlyMesh }) {
-    if (!this.programs || surface === "mesh" || obstacle !== "opaque" || onlyMesh) return false;
+  isShown({ surface, obstacle, isMixed, onlyMesh }) {
+    if (!this.programs || surface === "mesh" || obstacle !== "opaque" || isMixed || onlyMesh) return false;
     return surface === "exact" || (this.milliseconds !== null && this.milliseconds <= SLOW);
   }
 

@@ -21,7 +21,7 @@ class Viewer {
     this.run = { number: 0, playing: false, speed: 1 };
     this.stats = { draws: 0, milliseconds: 0 };
     this.look = {
-      colours: sceneColours(), obstacle: "opaque", surface: "automatic", water: "transparent", particles: !setting.has_surface, box: true, array: 0, map: "blue–yellow–red", fixed: null, blend: true,
+      colours: sceneColours(), obstacle: "opaque", bodies: {}, surface: "automatic", water: "transparent", particles: !setting.has_surface, box: true, array: 0, map: "blue–yellow–red", fixed: null, blend: true,
       cutting: { axis: "none", part: 0.5, flipped: false, solid: true, fluid: true }, turns: false, gravityInRoom: true,
       slicing: { axis: "none", part: 0.5 }, arrows: false, arrowLength: 1, trails: false, trailFrames: 12,
     };
@@ -40,7 +40,10 @@ class Viewer {
   begin({ picture, box: { min, max } }) {
     if (!picture) return;
     const { look } = this;
+    this.camera.parallel = picture.parallel;
     if (picture.obstacle) [look.obstacle, this.isJudged] = [picture.obstacle, true];
+    for (const name of picture.glass) look.bodies[name] = "transparent";
+    for (const name of picture.hide) look.bodies[name] = "hidden";
     if (!picture.cut) return;
     const { axis, at, below } = picture.cut;
     look.cutting = { axis: "xyz"[axis], part: clamp((at - min[axis]) / (max[axis] - min[axis]), 0, 1), flipped: below, solid: true, fluid: false };
@@ -77,7 +80,7 @@ class Viewer {
       this.camera.frame(look.boxBounds);
     }
     // controls in use stay as they are: only another set of them is built anew
-    const kind = JSON.stringify([setting.params.map(({ name, range, unit }) => [name, range, unit]), setting.arrays.map((array) => array.name), [...setting.solids].sort()]);
+    const kind = JSON.stringify([setting.params.map(({ name, range, unit }) => [name, range, unit]), setting.arrays.map((array) => array.name), [...setting.solids].sort(), setting.bodies]);
     if (kind !== this.kind) buildPanel(byId("panel"), this);
     else showParams(setting.params);
     if (byId("solid")) byId("solid").value = setting.solids[0];
@@ -277,6 +280,8 @@ class Viewer {
     this.settleMotion();
     if (byId("cut-value")) byId("cut-value").textContent = k < 0 ? "" : `${shown(at)} m`;
     look.parallel = camera.parallel;
+    look.looks = setting.bodies.map((name) => look.bodies[name] ?? look.obstacle);
+    look.isMixed = look.looks.some((one) => one !== look.obstacle);
     look.gravity = setting.gravity;
     if (setting.live && setting.gravity) {
       look.gravity = look.gravityInRoom ? turned(back(camera.turn), setting.gravity) : setting.gravity;
@@ -394,6 +399,7 @@ class Viewer {
     if (!this.isJudged && scene.solid && frames?.from.count > 0) {
       this.isJudged = true;
       if (scene.hiddenPart(look, view, projection, frames) > MOST_HIDDEN) byId("obstacle").value = look.obstacle = "transparent";
+      this.settle();
     }
     scene.draw(look, view, projection, frames, timeline);
     const seen = { view, all: times(projection, view) };
@@ -459,7 +465,7 @@ class Viewer {
   copyCamera() {
     const { canvas, look } = this;
     const text = this.camera.key(look.boxBounds, [canvas.clientWidth, canvas.clientHeight], this.free());
-    const said = text + besides(look, this.placeOf(look.cutting), this.scene.solid);
+    const said = text + besides(look, this.setting.bodies, this.placeOf(look.cutting), this.scene.solid);
     const copied = navigator.clipboard?.writeText(text) ?? Promise.reject();
     copied.then(() => this.state(`copied: ${said}`), () => this.state(said));
   }

@@ -36,6 +36,7 @@ function buildPanel(place, viewer) {
   if (setting.arrays.length) groups.push(colourGroup(viewer));
   const others = setting.solids.length > 1 ? choice("solid", [...setting.solids].sort(), setting.solids[0], (name) => viewer.send({ do: "solid", name })) : null;
   groups.push(group(setting.arrays.length ? "Obstacle" : "Solid", true, others ? row("which", others) : "", choice("obstacle", ["opaque", "transparent", "hidden"], look.obstacle, (value) => { look.obstacle = value; again(); }),
+    bodiesGroup(viewer),
     ...(setting.live ? [row("surface", choice("surface", ["automatic", "exact", "mesh"], look.surface, (value) => { look.surface = value; again(); })), element("p", { className: "note", id: "surface-said" })] : [])));
   if (setting.has_surface)
     groups.push(group("Surface of the fluid", true, choice("water", ["opaque", "transparent", "hidden"], look.water, (value) => { look.water = value; again(); })));
@@ -151,6 +152,19 @@ function showParams(params) {
     if (number !== document.activeElement || !number.isWritten) number.value = inUnit(param, param.value);
     track.value = to(clamp(param.value, low, high));
   }
+}
+
+/** The looks of single obstacles, where there are several of them, and not so many that nobody would look for one. */
+function bodiesGroup(viewer) {
+  const { look, setting: { bodies } } = viewer;
+  if (bodies.length < 2 || bodies.length > 40) return null;
+  const one = (name, k) =>
+    row(name, choice(`body-${k}`, ["as all", "opaque", "transparent", "hidden"], look.bodies[name] ?? "as all", (value) => {
+      if (value === "as all") delete look.bodies[name];
+      else look.bodies[name] = value;
+      viewer.changed();
+    }));
+  return group("One by one", Object.keys(look.bodies).length > 0, ...bodies.map(one));
 }
 
 /** The params of the file. A drag moves the obstacle at once; the run starts again when the slider is let go. */

@@ -85,6 +85,16 @@ class Scene {
     return this.parts.solid;
   }
 
+  /** Whether a part of the solids has a look. Parts are told apart where each of them is a body that has a name. */
+  hasLook(look, k, wanted) {
+    return (this.solid.triangles.length <= look.looks.length ? look.looks[k] : look.obstacle) === wanted;
+  }
+
+  /** Whether any part of the solids has a look. */
+  anyHas(look, wanted) {
+    return this.solid?.triangles.some((_, k) => this.hasLook(look, k, wanted)) ?? false;
+  }
+
   /** Gives the mesh that is shown as the solids or as the water, and where its parts are; `null`: where they were. */
   setMesh(name, mesh, poses = null) {
     if (this.shown[name] !== mesh) this.fillMesh(name, mesh);
@@ -141,7 +151,7 @@ class Scene {
     gl.disable(gl.BLEND);
     if (look.obstacle === "opaque") this.exact.measure(look, view, projection, look.time, look.values);
     if (this.exact.isShown(look)) this.exact.draw(look, view, projection, look.time, look.values);
-    else if (this.solid && look.obstacle === "opaque") this.drawMesh("solid", look, view, projection, 1);
+    else if (this.anyHas(look, "opaque")) this.drawMesh("solid", look, view, projection, 1);
     if (this.parts.water && look.water === "opaque") this.drawMesh("water", look, view, projection, 1);
     const fluid = frames?.from.count > 0;
     if (fluid && (look.particles || look.lacksSurface)) this.drawPoints(look, view, projection, frames);
@@ -150,7 +160,7 @@ class Scene {
     if (fluid && look.trails) this.motion.drawTrails(look, view, projection, timeline.frames, look.blended ? timeline.place : Math.floor(timeline.place + 1e-9));
     if (look.slice) this.slice.draw(look.slice, view, projection);
     if (this.parts.water && look.water === "transparent") this.drawMesh("water", look, view, projection, 0.45);
-    if (this.solid && look.obstacle === "transparent") this.drawMesh("solid", look, view, projection, 0.3);
+    if (this.anyHas(look, "transparent")) this.drawMesh("solid", look, view, projection, 0.3);
   }
 
   /** The part of what is seen of the particles that the obstacle hides. */
@@ -213,7 +223,8 @@ class Scene {
       let first = 0;
       part.triangles.forEach((triangles, k) => {
         mesh.set("Matrix4fv", "pose", false, poseMatrix(part.poses?.[k]));
-        gl.drawElements(gl.TRIANGLES, 3 * triangles, gl.UNSIGNED_INT, 12 * first);
+        const isDrawn = isWater || this.hasLook(look, k, opacity === 1 ? "opaque" : "transparent");
+        if (isDrawn) gl.drawElements(gl.TRIANGLES, 3 * triangles, gl.UNSIGNED_INT, 12 * first);
         first += triangles;
       });
     };
@@ -304,7 +315,7 @@ class Scene {
     points.set("1f", "height", height);
     // balls that stand out of a plane would hide what is seen in it
     const cut = look.cutFluid ? look.cut : NO_CUT;
-    const isSeen = cut !== NO_CUT && (look.slice || (look.cutSolid && this.solid && look.obstacle === "opaque"));
+    const isSeen = cut !== NO_CUT && (look.slice || (look.cutSolid && this.anyHas(look, "opaque")));
     points.set("4f", "cut", ...cut.slice(0, 3), isSeen ? cut[3] - 1.1 * look.radius : cut[3]);
     points.set("2f", "tone", ...toneOf(from.ranges[look.array], look.range));
     gl.activeTexture(gl.TEXTURE0);

@@ -43,6 +43,7 @@ pub const ALL: &[(&str, Case)] = &[
     ("lines that go away from the eye meet as in `rfm render`", looks::perspective),
     ("a page begins as the scene states it", looks::stated),
     ("obstacles between frames are where they were then", looks::between_frames),
+    ("each obstacle has a look of its own", looks::bodies),
     ("a container that hides the fluid begins transparent", looks::container),
     ("particles of metres are seen beside an obstacle", looks::large),
     ("the page of a report opens from a file", report),

@@ -59,6 +59,9 @@ pub fn perspective(room: &mut Room) {
         let found = room.browser.number(&ratio);
         assert!((found - 1.396_665_022_888_28).abs() < 1e-5, "{found}");
     }
+    let height = "(() => { own.parallel = true; return own.renderedHeight(own.box, own.axes().towards, own.centre); })()";
+    let found = room.browser.number(height);
+    assert!((found - 4.667_214_263_486).abs() < 1e-6, "{found}");
 }
 
 /// The camera, the cut and the colours of the scene; what is copied says the same.
@@ -89,6 +92,35 @@ pub fn stated(room: &mut Room) {
     assert_eq!(room.browser.eval(key), own);
     assert_eq!(room.browser.eval(look), "[[0,-1,0,-0.45],false,{\"low\":0,\"high\":2}]");
     leave(room, viewer);
+    let parallel = text.replace("zoom: 1.5,", "zoom: 1.5, projection: parallel,");
+    open(room, "parallel", &parallel);
+    room.browser.eval(alone);
+    let own = room.browser.eval(key);
+    let said =
+        "picture { camera: [0, -0.9578, 0.2873], look_at: [0.5, 0.5, 0.8], zoom: 1.5, projection: parallel }";
+    assert_eq!(own, said);
+    assert_eq!(room.browser.eval("document.getElementById('parallel').checked"), true);
+}
+
+/// Each obstacle has its own look: the scene says which are hidden and clear, and the page changes that.
+pub fn bodies(room: &mut Room) {
+    let own = DAM.replace("  run {", "  picture { cut: none, hide: gate, glass: blade }\n  run {");
+    open(room, "bodies", &own);
+    let looks = "viewer.setting.bodies.map((name, k) => name + ' ' + viewer.look.looks[k]).join()";
+    assert_eq!(room.browser.eval(looks), "gate hidden,blade transparent");
+    let both_away = {
+        room.browser.choose("#body-1", "hidden");
+        Picture::of(&room.scene())
+    };
+    room.browser.choose("#body-0", "as all");
+    assert_eq!(room.browser.eval(looks), "gate opaque,blade hidden");
+    let with_gate = Picture::of(&room.scene());
+    assert!(with_gate.difference(&both_away) > 1.0, "{}", with_gate.difference(&both_away));
+    room.shot("bodies");
+    let said = "besides(viewer.look, viewer.setting.bodies, 0, viewer.scene.solid)";
+    assert_eq!(room.browser.eval(said), "; beside it: --cut none --hide blade");
+    room.browser.choose("#obstacle", "hidden");
+    assert!(Picture::of(&room.scene()).difference(&both_away) < 0.1);
 }
 
 /// A gate that rises and a blade that turns, between two frames.

@@ -123,6 +123,7 @@ fn page_of_simulation(experiment: &Experiment, simulation: &Simulation, facts: &
         radius: 0.5 * experiment.parameters().spacing(),
         arrays: ["speed", "density", "pressure"].into_iter().chain(VELOCITY).map(array).collect(),
         solids: Vec::new(),
+        bodies: Vec::new(),
         gravity: None,
         params: Vec::new(),
         plots: None,
