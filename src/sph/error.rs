@@ -211,9 +211,10 @@ impl fmt::Display for StepError {
                 } else {
                     format!("{:.0e} times {start}", 1.0 + excess)
                 };
+                let or = if *walls_move { " unless a wall jumps" } else { "" };
                 return write!(
                     f,
-                    "step {step}: without any work the energy is {grown}, which no fluid does; particle {id} is the \
+                    "step {step}: without any work the energy is {grown}, which no fluid does{or}; particle {id} is the \
                      fastest, with {speed:.2e} m/s"
                 );
             }
