@@ -38,7 +38,6 @@ fn line_ends_and_byte_order_marks_do_not_matter() {
     check("\u{FEFF}rfm 1\r\nparam r = 1 in 0 .. 2 \"radius\"\r\nsolid s = sphere(r) # a ball\r\n", 0, "");
     let quoted = "<stdin>:2:18\n  |\n2 | solid s = sphere(q)\n  |                  ^";
     check("rfm 1\r\nsolid s = sphere(q)\r\n", 1, quoted);
-    check("rfm 1\r\nsolid s =\r\n  sphere(1,\r\n  ω)\r\n", 1, "3 | /   sphere(1,\n4 | |   ω)\n");
 }
 
 #[test]

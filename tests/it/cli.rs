@@ -116,7 +116,7 @@ fn other_files_are_checked_beside_one_that_is_missing() {
     let names: Vec<_> = document["solids"].as_array().unwrap().iter().map(|solid| &solid["name"]).collect();
     assert_eq!(names, ["pawn", "cube"]);
     for name in ["none.rfm", "nor.rfm"] {
-        assert!(outcome.stderr.contains(&format!("cannot read `{name}`")), "{}", outcome.stderr);
+        assert!(outcome.stderr.contains(&format!("there is no file `{name}`")), "{}", outcome.stderr);
     }
 }
 

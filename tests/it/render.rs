@@ -317,7 +317,9 @@ fn refusals_say_why() {
         (&["swing.rfm", "-o", "a.gif", "--times", "0..1e9"], "100000 is the most; --fps"),
         (&["swing.rfm", "-o", "a.gif", "--time", "1"], "--times A..B are those of a film"),
         (&["drop.rfm", "--cut", "auto"], "choose a plane"),
-        (&["nothing.rfm"], "cannot read `nothing.rfm`"),
+        (&["nothing.rfm"], "there is no file `nothing.rfm`"),
+        (&["nothing", "--frames", "1"], "there is no file `nothing`"),
+        (&["drop.rfn"], "did you mean `drop.rfm`?"),
         (&["drop.out", "-o", "no/such/a.gif"], "does not exist"),
     ];
     for (arguments, reason) in cases {

@@ -58,6 +58,10 @@ fn pictures_and_pages_obey_what_the_scene_states() {
     assert_eq!(asked.1, 2.0);
     assert!(asked == picture(stating.path(), &[]), "the scene says the same as the flags");
     assert!(asked != picture(plain.path(), &[]));
+    let parallel = picture(plain.path(), &["--parallel"]);
+    assert!(parallel != picture(plain.path(), &[]));
+    let copied = "picture { camera: [0.48, -1, 0.46], projection: parallel }";
+    assert!(parallel == picture(plain.path(), &["--camera", copied]));
     // flags come first
     let others = ["--camera", "1,0,0", "--cut", "none", "--range", "0..5"];
     let hiding = [&others[..], &["--hide", "moon", "--glass", "post"]].concat();
@@ -72,7 +76,8 @@ fn pictures_and_pages_obey_what_the_scene_states() {
     let told = page(stating.path());
     let expected = serde_json::json!({
         "camera": [0.0, -1.0, 0.3], "look_at": [0.5, 0.5, 0.8], "zoom": 1.5,
-        "cut": { "axis": 1, "at": 0.45, "below": true }, "obstacle": "transparent",
+        "cut": { "axis": 1, "at": 0.45, "below": true }, "obstacle": "opaque", "parallel": false,
+        "hide": ["moon"], "glass": ["post"],
     });
     assert_eq!(told["picture"], expected);
     assert_eq!(told["arrays"][0]["range"]["high"], 2.0);
