@@ -318,7 +318,10 @@ holds 93 % of what it should, one of 1.5 spacings 66 %, one of 1 spacing 51 %, a
 wall the fluid on one side feels that on the other more than its own second neighbours. Of a wall whose load a probe
 measures it is told if it is thinner than one and a half spacings: kernels before it reach beyond it, and where nothing
 is behind it the fluid is pressed against it harder than it should be. The message says how thin it is, where, and what
-spacing is small enough. Parts that extend over less than two spacings, and the tips of wedges, do not count.";
+spacing is small enough. Parts that extend over less than two spacings, and the tips of wedges, do not count.
+
+An obstacle that is smaller than a particle as a whole, or a rod of less than half its width, is told of too: particles flow past
+it almost as if it were not there. The spacing may follow from the number of particles, 10 000 unless it is stated.";
 DRY_WALL = "W0518":
 "The fluid's shape tapers off between an obstacle and another wall, and becomes thinner than a particle: below a cylinder that
 lies on a floor, in a narrow wedge, or in a gap. Particles keep half a spacing from walls, so such places stay empty, nothing
