@@ -242,3 +242,14 @@ fn what_a_choice_cuts_out_is_measured_within_the_error() {
         assert!(off <= figure("volume_error") && figure("volume_error") < 0.01, "{found}, {exact}");
     }
 }
+
+/// Plates as thin as the cells, some of which coarser meshes miss, are measured with more of them.
+#[test]
+fn plates_that_coarse_meshes_miss_are_measured_with_more_cells() {
+    let text = b"rfm 1\nsolid plates = box([0, -0.1, 0], [8, 0, 1]) or box([0, 1, 0], [8, 1.1, 1])";
+    let document = rfm_reading(root(), &["check", "--json", "-"], text).expect(0).json();
+    let solid = &document["solids"][0];
+    assert!((solid["volume"].as_f64().unwrap() - 1.6).abs() < 1e-9, "{solid}");
+    assert!(solid["volume_error"].as_f64().unwrap() < 1e-3, "{solid}");
+    assert_eq!(solid["components"], 2, "{solid}");
+}

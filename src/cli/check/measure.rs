@@ -18,6 +18,10 @@ const MOST_UNKNOWN: usize = 50;
 
 /// The most cells on three faces of the bounds with which a solid is measured that is too thin for the usual ones, 512
 /// along each side of a cube, and how often it gets more.
+/// The part of the volume from which on its error tells of a part that coarser meshes have missed: of plates as thin as
+/// their cells, errors were a tenth of the volume and more.
+const MISSED_PART: f64 = 0.05;
+
 const MOST_ON_FACES: f64 = 3.0 * 512.0 * 512.0;
 const REFINED: usize = 3;
 
@@ -87,7 +91,8 @@ pub(super) fn measure(
         Some(found) => trust_no_more_than(found, &mut facts),
         None => {}
     }
-    if let Some(thin) = thin.filter(|_| facts.resolved == Some(false) || is_hidden) {
+    let is_uncertain = facts.resolved == Some(true) && is_uncertain(&facts);
+    if let Some(thin) = thin.filter(|_| facts.resolved == Some(false) || is_hidden || is_uncertain) {
         refine((solid, &*surface, bounds), (&grid, thin), lines.as_ref(), watch, (&mut facts, notes));
     }
     if facts.resolved == Some(false) && facts.lines.is_none() {
@@ -98,6 +103,11 @@ pub(super) fn measure(
     facts.shows_nothing =
         shows_nothing && lines.is_none() && thin.is_some_and(|thin| thin.count == 0 && !thin.ended);
     Ok((facts, thin.unwrap_or(ThinCells::NONE)))
+}
+
+/// Whether the coarser of the meshes are so far off that they must have missed a part.
+fn is_uncertain(facts: &Facts) -> bool {
+    facts.volume.zip(facts.volume_error).is_some_and(|(volume, error)| error > MISSED_PART * volume.abs())
 }
 
 /// Whether the meshes show all parts; `None` where that is not known.
