@@ -72,6 +72,8 @@ fn offsets_of_rounded_shapes_have_bounds_and_ranges() {
     }
     let range = moved.range(&Aabb::new(DVec3::splat(0.9), DVec3::splat(1.0)));
     assert!(range.hi - range.lo < 1.0, "{range:?}");
+    let Bounds::Within(cut) = *solid("chamfer(sphere(1), box(), 0.2).round(0.1)").bounds() else { panic!() };
+    assert!(cut.size().max_element() < 2.3, "{cut:?}");
 }
 
 /// Bounds that may be too large say so.
