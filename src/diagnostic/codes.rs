@@ -109,7 +109,8 @@ then used for values of ω; `rfm check` prints which one.
     solid post = x² + y² <= 0.25 and 0 <= z <= 1";
 OUTLINE = "E0215":
 "The corners of a polygon do not enclose an area: two edges cross or touch, a corner stands twice, or the outline turns
-back on itself. List the corners along the outline, each once, in either direction.
+back on itself. List the corners along the outline, each once, in either direction. Or the two outlines of a loft lie beside each
+other: between them nothing would be left.
 
     rfm 1
     solid arrow = polygon([[0, 0], [2, 1], [0, 2], [0.5, 1]]).extrude(0, 1)";

@@ -34,7 +34,7 @@ enum Meaning {
 }
 
 /// The builtins that are more than one operation on one number.
-const COMPOSED: [Builtin; 30] = {
+const COMPOSED: [Builtin; 31] = {
     use Meaning::{Number, NumberOfVectors, Unevaluated, Value, Vector};
     const MANY: usize = usize::MAX;
     const fn builtin(name: &'static str, arity: (usize, usize), meaning: Meaning) -> Builtin {
@@ -87,6 +87,7 @@ const COMPOSED: [Builtin; 30] = {
         builtin("sweep", (2, 2), Value(|l, values, arguments, span| l.sweep(values, arguments, span))),
         builtin("text", (2, 2), Value(|l, values, arguments, span| l.text(values, arguments, span))),
         builtin("around", (2, 2), Number(|l, a, span| l.around(a[0], a[1], span))),
+        builtin("overlapping", (2, 2), Number(|l, a, span| l.overlapping(a[0], a[1], span))),
         builtin("slope", (1, 1), Number(|l, a, span| l.slope(a[0], span))),
         builtin("normalise", (1, 1), Number(|l, a, span| l.normalise(a[0], span))),
         builtin("normalize", (1, 1), Number(|l, a, span| l.normalise(a[0], span))),
