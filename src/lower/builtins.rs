@@ -94,6 +94,9 @@ const COMPOSED: [Builtin; 31] = {
     ]
 };
 
+/// How what a count is for is told in the standard solids.
+const NUMBER_OF: &str = "the number of";
+
 const POSITIVE: Builtin = Builtin {
     name: "positive",
     arity: (1, 2),
@@ -343,7 +346,10 @@ impl Lowering<'_> {
         let result = self.expr(value);
         let Value::Number(node) = result else { return result };
         let Some(number) = self.known_value(node) else { return result };
-        if number > 0.0 && number.is_finite() {
+        let is_count =
+            matches!(what.map(|what| &what.kind), Some(ExprKind::Text(text)) if text.starts_with(NUMBER_OF));
+        let is_broken = is_count && number.fract() != 0.0;
+        if number > 0.0 && number.is_finite() && !is_broken {
             return result;
         }
         let origin = match &value.kind {
@@ -355,7 +361,8 @@ impl Lowering<'_> {
             _ => "the value",
         };
         let at = self.user_span(origin.unwrap_or(span));
-        let message = format!("{what} must be positive, found {number}");
+        let wanted = if is_broken { "a whole number" } else { "positive" };
+        let message = format!("{what} must be {wanted}, found {number}");
         let diagnostic = Diagnostic::error(Code::OUT_OF_RANGE, at, message);
         let is_negative = number < 0.0 && number.is_finite();
         if is_negative && what.starts_with("the size of a box along") {
