@@ -249,13 +249,10 @@ pub(super) fn of_scenes(
         for (k, (obstacle, body)) in scene.obstacles.iter().zip(obstacles).enumerate() {
             found.extend(experiment::out_of_reach((scene, spacing), obstacle, (&body.solid, outside)));
             let wall = experiment::wall_limit(scene, usize::from(outside.is_some()) + k);
-            let search = (obstacle.shape, experiment::thin_lengths(wall, spacing), scene.domain);
-            found.extend(experiment::too_thin(
-                (scene, spacing),
-                obstacle,
-                wall,
-                searches.thin_parts(&body.solid.at(0.0), search),
-            ));
+            let solid = body.solid.at(0.0);
+            found.extend(experiment::too_fine((scene, spacing), obstacle, (&solid, wall), |lengths| {
+                searches.thin_parts(&solid, (obstacle.shape, lengths, scene.domain))
+            }));
         }
         found.extend(of_fluid(&experiment));
     }
@@ -373,9 +370,12 @@ pub(super) fn of_experiment(experiment: &Experiment, searches: &mut Searches) ->
             let solids = (&body.solid, outside.map(|outside| &outside.solid));
             found.list.extend(experiment::out_of_reach((scene, spacing), obstacle, solids));
             let wall = experiment::wall_limit(scene, number);
-            let lengths = experiment::thin_lengths(wall, spacing);
-            let parts = searches.thin_parts(&body.solid, (obstacle.shape, lengths, scene.domain));
-            found.list.extend(experiment::too_thin((scene, spacing), obstacle, wall, parts));
+            found.list.extend(experiment::too_fine(
+                (scene, spacing),
+                obstacle,
+                (&body.solid, wall),
+                |lengths| searches.thin_parts(&body.solid, (obstacle.shape, lengths, scene.domain)),
+            ));
         }
     }
     found

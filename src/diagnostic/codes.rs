@@ -109,7 +109,8 @@ then used for values of ω; `rfm check` prints which one.
     solid post = x² + y² <= 0.25 and 0 <= z <= 1";
 OUTLINE = "E0215":
 "The corners of a polygon do not enclose an area: two edges cross or touch, a corner stands twice, or the outline turns
-back on itself. List the corners along the outline, each once, in either direction.
+back on itself. List the corners along the outline, each once, in either direction. Or the two outlines of a loft lie beside each
+other: between them nothing would be left.
 
     rfm 1
     solid arrow = polygon([[0, 0], [2, 1], [0, 2], [0.5, 1]]).extrude(0, 1)";
@@ -318,7 +319,10 @@ holds 93 % of what it should, one of 1.5 spacings 66 %, one of 1 spacing 51 %, a
 wall the fluid on one side feels that on the other more than its own second neighbours. Of a wall whose load a probe
 measures it is told if it is thinner than one and a half spacings: kernels before it reach beyond it, and where nothing
 is behind it the fluid is pressed against it harder than it should be. The message says how thin it is, where, and what
-spacing is small enough. Parts that extend over less than two spacings, and the tips of wedges, do not count.";
+spacing is small enough. Parts that extend over less than two spacings, and the tips of wedges, do not count.
+
+An obstacle that is smaller than a particle as a whole, or a rod of less than half its width, is told of too: particles flow past
+it almost as if it were not there. The spacing may follow from the number of particles, 10 000 unless it is stated.";
 DRY_WALL = "W0518":
 "The fluid's shape tapers off between an obstacle and another wall, and becomes thinner than a particle: below a cylinder that
 lies on a floor, in a narrow wedge, or in a gap. Particles keep half a spacing from walls, so such places stay empty, nothing

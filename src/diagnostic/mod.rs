@@ -150,7 +150,7 @@ impl Diagnostic {
 }
 
 /// The candidate with the fewest typing slips from `written`. `None` if each has more than one slip and more
-/// than one in three letters.
+/// than one in three letters, and none has just one or two letters more, as `sphere` has than `sphr`.
 pub fn nearest<'a>(written: &str, candidates: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
     let length = written.chars().count();
     // a single letter is near to every other
@@ -159,9 +159,20 @@ pub fn nearest<'a>(written: &str, candidates: impl IntoIterator<Item = &'a str>)
     candidates
         .into_iter()
         .map(|name| (strsim::damerau_levenshtein(&lower, &name.to_lowercase()), name))
-        .filter(|&(slips, name)| slips <= limit && slips < name.chars().count())
+        .filter(|&(slips, name)| {
+            slips < name.chars().count() && (slips <= limit || slips <= 2 && is_short_for(&lower, name))
+        })
         .min()
         .map(|(_, name)| name)
+}
+
+/// Whether a word of four letters or more is a name without some of its letters, of which the first is there.
+fn is_short_for(lower: &str, name: &str) -> bool {
+    let name = name.to_lowercase();
+    let mut left = name.chars();
+    lower.chars().count() > 3
+        && lower.chars().next() == name.chars().next()
+        && lower.chars().all(|letter| left.any(|other| other == letter))
 }
 
 /// The messages of one compilation, together with the texts that they point into. This is the error type of
@@ -202,6 +213,8 @@ mod tests {
     fn suggestions_stay_near() {
         assert_eq!(nearest("spere", ["sphere", "box", "cone"]), Some("sphere"));
         assert_eq!(nearest("q", ["sphere", "x"]), None);
+        assert_eq!(nearest("sphr", ["sphere", "box", "cone"]), Some("sphere"));
+        assert_eq!(nearest("post", ["position", "box", "cone"]), None);
         assert_eq!(nearest("visocsity", ["viscosity", "density"]), Some("viscosity"));
     }
 

@@ -35,6 +35,9 @@ const LOADED_WALL: f64 = 1.5;
 /// should, of 1.5 spacings 66 %, of 2 spacings 93 %, and of 2.5 spacings 99 %.
 const THIN_GAP: f64 = 2.0;
 
+/// The least number of spacings across an obstacle with which its shape is seen.
+const SPACINGS_ACROSS: f64 = 4.0;
+
 /// Walls and gaps as wide as this part of the limit are wide enough.
 const ALMOST: f64 = 0.999;
 
@@ -56,8 +59,9 @@ impl Experiment {
         for (k, (obstacle, body)) in scene.obstacles.iter().zip(obstacles).enumerate() {
             found.extend(out_of_reach((scene, spacing), obstacle, (&body.solid, outside)));
             let wall = wall_limit(scene, containers + k);
-            let parts = body.solid.thin_parts(thin_lengths(wall, spacing), &scene.domain, &mut operations);
-            found.extend(too_thin((scene, spacing), obstacle, wall, parts));
+            found.extend(too_fine((scene, spacing), obstacle, (&body.solid, wall), |lengths| {
+                body.solid.thin_parts(lengths, &scene.domain, &mut operations)
+            }));
         }
         self.diagnostics(found)
     }
@@ -86,8 +90,55 @@ pub fn out_of_reach(
     })
 }
 
+/// Warnings about what particles do not show of an obstacle: all of it, or its thinnest wall and gap, which are looked for
+/// below the lengths that are handed to `thin_parts`.
+pub fn too_fine(
+    (scene, spacing): (&Scene, f64),
+    obstacle: &Obstacle,
+    (solid, of_wall): (&Solid, f64),
+    thin_parts: impl FnOnce([f64; 3]) -> [Option<ThinPart>; 2],
+) -> Vec<Diagnostic> {
+    match too_small((scene, spacing), obstacle, solid) {
+        Some(warning) => vec![warning],
+        None => {
+            let parts = thin_parts(thin_lengths(of_wall, spacing));
+            too_thin((scene, spacing), obstacle, of_wall, parts).collect()
+        }
+    }
+}
+
+/// A warning if an obstacle is smaller than a particle, or a rod that is thinner than half of one.
+fn too_small((scene, spacing): (&Scene, f64), obstacle: &Obstacle, solid: &Solid) -> Option<Diagnostic> {
+    let mut sides = solid.bounds().aabb()?.size().to_array();
+    sides.sort_by(f64::total_cmp);
+    let [_, width, length] = sides;
+    let (size, what) = match () {
+        () if length < ALMOST * spacing => (length, "smaller than a particle: its longest side is"),
+        () if width < ALMOST * THIN_WALL * spacing => {
+            (width, "thinner than half of a particle: its width is")
+        }
+        () => return None,
+    };
+    let message = format!(
+        "obstacle `{}` is {what} {size:.2e} m, with {spacing:.2e} m between particles, so that it hardly holds the fluid \
+         up, and loads on it are too small",
+        obstacle.name
+    );
+    let needed = rounded_down(size / SPACINGS_ACROSS);
+    let help = format!("{} shows its shape; or leave the obstacle out", spacing_of(scene, spacing, needed));
+    Some(Diagnostic::warning(Code::THIN_FOR_PARTICLES, obstacle.span, message).help(help))
+}
+
+/// A smaller spacing in words, and how many particles have it.
+fn spacing_of(scene: &Scene, spacing: f64, needed: f64) -> String {
+    let number = scene.fluid.particles.map_or_else(String::new, |n| {
+        format!(", that of {:.1e} particles,", n as f64 * (spacing / needed).powi(3))
+    });
+    format!("a spacing of {needed:.1e} m{number}")
+}
+
 /// Messages about the thinnest wall and the thinnest gap of an obstacle.
-pub fn too_thin(
+fn too_thin(
     scene: (&Scene, f64),
     obstacle: &Obstacle,
     of_wall: f64,
@@ -99,7 +150,7 @@ pub fn too_thin(
 }
 
 /// The thicknesses, m, below which walls and gaps are reported, and the room that a fluid needs.
-pub fn thin_lengths(of_wall: f64, spacing: f64) -> [f64; 3] {
+fn thin_lengths(of_wall: f64, spacing: f64) -> [f64; 3] {
     [of_wall * spacing, THIN_GAP * spacing, spacing]
 }
 
@@ -136,10 +187,7 @@ fn thin(
     );
     // so that it is shown
     let needed = rounded_down(part.thickness / of_spacing);
-    let number = scene.fluid.particles.map_or_else(String::new, |n| {
-        format!(", that of {:.1e} particles,", n as f64 * (spacing / needed).powi(3))
-    });
-    let help = format!("a spacing of {needed:.1e} m{number} is small enough; or make the {what} wider");
+    let help = format!("{} is small enough; or make the {what} wider", spacing_of(scene, spacing, needed));
     Some(Diagnostic::warning(Code::THIN_FOR_PARTICLES, obstacle.span, message).help(help))
 }
 

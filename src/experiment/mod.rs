@@ -52,7 +52,7 @@ pub use deviation::{Deviation, Deviations};
 pub use every::Every;
 pub use filling::spacing;
 pub use mean::Mean;
-pub use misfits::{MOST_OBSTACLES, out_of_reach, thin_lengths, too_thin, wall_limit};
+pub use misfits::{MOST_OBSTACLES, out_of_reach, too_fine, wall_limit};
 pub use out_of_reach::is_out_of_reach;
 pub use parameters::TimeStep;
 pub use probes::probe_column;

@@ -34,7 +34,7 @@ enum Meaning {
 }
 
 /// The builtins that are more than one operation on one number.
-const COMPOSED: [Builtin; 30] = {
+const COMPOSED: [Builtin; 31] = {
     use Meaning::{Number, NumberOfVectors, Unevaluated, Value, Vector};
     const MANY: usize = usize::MAX;
     const fn builtin(name: &'static str, arity: (usize, usize), meaning: Meaning) -> Builtin {
@@ -87,11 +87,15 @@ const COMPOSED: [Builtin; 30] = {
         builtin("sweep", (2, 2), Value(|l, values, arguments, span| l.sweep(values, arguments, span))),
         builtin("text", (2, 2), Value(|l, values, arguments, span| l.text(values, arguments, span))),
         builtin("around", (2, 2), Number(|l, a, span| l.around(a[0], a[1], span))),
+        builtin("overlapping", (2, 2), Number(|l, a, span| l.overlapping(a[0], a[1], span))),
         builtin("slope", (1, 1), Number(|l, a, span| l.slope(a[0], span))),
         builtin("normalise", (1, 1), Number(|l, a, span| l.normalise(a[0], span))),
         builtin("normalize", (1, 1), Number(|l, a, span| l.normalise(a[0], span))),
     ]
 };
+
+/// How what a count is for is told in the standard solids.
+const NUMBER_OF: &str = "the number of";
 
 const POSITIVE: Builtin = Builtin {
     name: "positive",
@@ -342,7 +346,10 @@ impl Lowering<'_> {
         let result = self.expr(value);
         let Value::Number(node) = result else { return result };
         let Some(number) = self.known_value(node) else { return result };
-        if number > 0.0 && number.is_finite() {
+        let is_count =
+            matches!(what.map(|what| &what.kind), Some(ExprKind::Text(text)) if text.starts_with(NUMBER_OF));
+        let is_broken = is_count && number.fract() != 0.0;
+        if number > 0.0 && number.is_finite() && !is_broken {
             return result;
         }
         let origin = match &value.kind {
@@ -354,7 +361,8 @@ impl Lowering<'_> {
             _ => "the value",
         };
         let at = self.user_span(origin.unwrap_or(span));
-        let message = format!("{what} must be positive, found {number}");
+        let wanted = if is_broken { "a whole number" } else { "positive" };
+        let message = format!("{what} must be {wanted}, found {number}");
         let diagnostic = Diagnostic::error(Code::OUT_OF_RANGE, at, message);
         let is_negative = number < 0.0 && number.is_finite();
         if is_negative && what.starts_with("the size of a box along") {

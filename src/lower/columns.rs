@@ -102,17 +102,14 @@ impl Lowering<'_> {
     }
 }
 
-/// Rows as points of one kind. A last row that repeats the first one, as outlines of wings have it, is left out.
-fn points_of(mut rows: Vec<Vec<f64>>) -> Result<Vec<Vec<f64>>, String> {
+/// Rows as points of one kind.
+fn points_of(rows: Vec<Vec<f64>>) -> Result<Vec<Vec<f64>>, String> {
     let columns = rows.first().map_or(0, Vec::len);
     if columns > 3 {
         return Err(format!("its first row has {columns} numbers"));
     }
     if let Some(row) = rows.iter().position(|row| row.len() != columns) {
         return Err(format!("row {} has {} numbers and not {columns}", row + 1, rows[row].len()));
-    }
-    if rows.len() > 2 && rows.first() == rows.last() {
-        rows.pop();
     }
     Ok(rows)
 }
@@ -157,7 +154,8 @@ mod tests {
     fn titles_and_comments_are_no_rows() {
         let rows = |text: &str| numbers(text).and_then(points_of);
         let text = "NACA 0006\nx, y\n# upper\n1.0  0.0\n0.5,0.03\n\n0;0\n0.5 -0.03\n1 0\n";
-        let expected = [[1.0, 0.0], [0.5, 0.03], [0.0, 0.0], [0.5, -0.03]].map(|row| row.to_vec());
+        let expected =
+            [[1.0, 0.0], [0.5, 0.03], [0.0, 0.0], [0.5, -0.03], [1.0, 0.0]].map(|row| row.to_vec());
         assert_eq!(rows(text).unwrap(), expected);
         assert_eq!(rows("3\n4\n").unwrap(), [[3.0], [4.0]]);
     }

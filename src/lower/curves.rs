@@ -11,6 +11,9 @@ pub(super) const MOST_POINTS: usize = 10_000;
 /// Sines below this are those of rounded angles.
 const STRAIGHT: f64 = 1e-12;
 
+/// A path that turns back by more than 150° has an edge there, as wings have it: the cosine of the turn.
+const SHARP: f64 = -0.866_025_403_784_438_6;
+
 /// What is wrong with a curve.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Flaw {
@@ -139,10 +142,13 @@ impl Legs {
 }
 
 /// The cubic spline through points, over the length of the chords between them: its direction and its curvature have no
-/// jumps. Its ends are straight; if the last point is the first one, it is closed and as smooth there as elsewhere.
+/// jumps. Its ends are straight; if the last point is the first one, it is closed and as smooth there as elsewhere, unless
+/// the points turn back there: a spline around the sharp edge of a wing would cross itself.
 pub(super) fn spline(points: &[DVec3], tolerance: f64) -> Result<Vec<DVec3>, Flaw> {
     let Legs { closed, lengths, ahead } = Legs::between(points)?;
-    let bends = if closed { closed_bends(&lengths, &ahead) } else { open_bends(&lengths, &ahead) };
+    let turns_back = matches!(&ahead[..], [first, .., last] if first.dot(*last) < SHARP);
+    let bends =
+        if closed && !turns_back { closed_bends(&lengths, &ahead) } else { open_bends(&lengths, &ahead) };
     let mut chain = vec![points[0]];
     for i in 0..lengths.len() {
         let (length, from, to) = (lengths[i], bends[i], bends[i + 1]);

@@ -207,10 +207,11 @@ impl<'a> Lowering<'a> {
                 .help("save the mesh as STL, OBJ or PLY in the program that it comes from"));
         }
         let bytes = self.read_file(path, span)?;
-        let refused = |message: String| {
-            Diagnostic::error(Code::MESH, span, message)
-                .help("repair it in the program that it comes from; `rfm explain E0217` says what is needed")
+        let help = match bytes.is_empty() {
+            true => "write it once more: the program that it comes from has put nothing into it",
+            false => "repair it in the program that it comes from; `rfm explain E0217` says what is needed",
         };
+        let refused = |message: String| Diagnostic::error(Code::MESH, span, message).help(help);
         self.files.table(format!("mesh {:x} {name}", unit.to_bits()), || {
             let mut triangles = triangles::read(path, &bytes)
                 .map_err(|reason| refused(format!("`{path}` cannot be read as a mesh: {reason}")))?;

@@ -98,6 +98,12 @@ impl Lowering<'_> {
             Members::List(list) => self.fold_list(op, list),
         };
         let Some(values) = values else { return Value::Failed };
+        if let (Members::List(list), true) = (members, values.is_empty() && !op.has_value_of_none()) {
+            let message = format!("`{}` over a list without members", op.word());
+            let help = format!("{}: give the list a member, or leave the fold out", of_none(op));
+            let span = self.user_span(list.span);
+            return self.fail(Diagnostic::error(Code::OUT_OF_RANGE, span, message).help(help));
+        }
         if !self.may_be_local(variable) {
             return Value::Failed;
         }
@@ -144,7 +150,7 @@ impl Lowering<'_> {
             self.report(Diagnostic::error(Code::OUT_OF_RANGE, whole, message));
             return None;
         }
-        if start >= end && !matches!(op, Fold::Sum | Fold::Product) {
+        if start >= end && !op.has_value_of_none() {
             let message = format!("`{}` over the range {start} .. {end}, which has no member", op.word());
             self.report(Diagnostic::error(Code::OUT_OF_RANGE, whole, message).help(self.more_members(op)));
             return None;
@@ -171,11 +177,7 @@ impl Lowering<'_> {
 
     /// What to write for a fold without members: it has no value, as a sum has.
     fn more_members(&self, op: Fold) -> String {
-        let why = match op {
-            Fold::Any | Fold::All => "no shape would be left, and there is no formula for none",
-            Fold::Min | Fold::Max => "no number is the least or greatest of none",
-            Fold::Sum | Fold::Product => "a sum over none is 0 and a product 1",
-        };
+        let why = of_none(op);
         // `any i in 0..n: any j in 0..i: …`
         match self.scope.locals.last().filter(|local| local.bare && self.scope.calls.is_empty()) {
             Some(outer) => format!("{why}: begin the range of `{}` where this one has a member", outer.name),
@@ -223,5 +225,14 @@ impl Lowering<'_> {
             Fold::Max => self.chain(Binary::Max, &nodes, span),
             Fold::Product | Fold::Sum => self.chain(Binary::Mul, &nodes, span),
         })
+    }
+}
+
+/// Why a fold has no value without members, or which one it has.
+fn of_none(op: Fold) -> &'static str {
+    match op {
+        Fold::Any | Fold::All => "no shape would be left, and there is no formula for none",
+        Fold::Min | Fold::Max => "no number is the least or greatest of none",
+        Fold::Sum | Fold::Product => "a sum over none is 0 and a product 1",
     }
 }

@@ -37,6 +37,27 @@ impl Lowering<'_> {
         self.least_with_round(field, p, bounds.centre().to_array(), radius, span)
     }
 
+    /// The second of two outlines, between which a loft leads: they must not lie beside each other.
+    pub fn overlapping(&mut self, a: Node, b: Node, span: Span) -> Node {
+        let [x, y, z] = Axis::SPACE.map(|axis| self.module.graph.coordinate(axis));
+        let [zero, one] = [0.0, 1.0].map(|number| self.constant(number));
+        let rest = self.binary(Binary::Sub, one, z, span);
+        let layer = self.binary(Binary::Mul, z, rest, span);
+        let reach = [a, b].map(|outline| {
+            let flat = self.module.graph.substitute(outline, [x, y, zero]);
+            let part = self.binary(Binary::And, flat, layer, span);
+            ir::reach(&self.module.graph, part)
+        });
+        if let [Some(first), Some(second)] = reach
+            && first.intersection(&second).is_empty()
+        {
+            let message = "the outlines of a loft lie beside each other, and a loft holds only what lies between overlapping ones";
+            let help = "move one over the other with `.move`; a tube from place to place is `sweep([[0, 0, 0], [3, 0, 1]], 0.1)`";
+            self.report(Diagnostic::error(Code::OUTLINE, self.user_span(span), message).help(help));
+        }
+        b
+    }
+
     /// The least of a field and that of a disc or ball, which is a tenth larger than asked for, so that the surface is
     /// that of the field.
     fn least_with_round<const N: usize>(

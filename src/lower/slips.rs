@@ -450,6 +450,10 @@ impl Lowering<'_> {
             ("mirror", _) => ".mirror([1, 0, 0])".into(),
             ("at", _) => ".at([2*x, y, z])".into(),
             ("turned", _) => ".turned(0.5*z)".into(),
+            ("repeat", [step, count]) if ![step, count].into_iter().any(|text| is_vector(text)) => {
+                format!(".repeat([{step}, 0, 0], [{count}, 1, 1])")
+            }
+            ("repeat", [step]) if is_vector(step) => format!(".repeat({step}, [6, 1, 1])"),
             ("repeat", _) => ".repeat([2, 0, 0], [6, 1, 1])".into(),
             ("round" | "offset", _) => format!(".{method}(0.1)"),
             ("distance", _) => ".distance()".into(),

@@ -6,7 +6,7 @@
 
 use std::cell::Cell;
 use std::collections::BinaryHeap;
-use std::sync::Arc;
+use std::sync::OnceLock;
 
 use glam::DVec3;
 
@@ -37,13 +37,34 @@ pub struct Distances {
     /// What a sign at a point costs, in the unit of the work.
     work_of_sign: usize,
     /// Where ω is positive, and where it is negative.
-    positive: Target,
-    negative: Target,
+    positive: Side,
+    negative: Side,
+}
+
+/// Where ω has one sign.
+struct Side {
+    target: Target,
+    lead: Lead,
+}
+
+/// What leads to a side where no short ray does; found once for all points.
+#[derive(Default)]
+struct Lead {
+    /// Whether the side has an end in all directions.
+    ends: OnceLock<bool>,
+    /// Some places there, far from one another.
+    places: OnceLock<Vec<DVec3>>,
 }
 
 enum Target {
     Tree(Tree),
     Whole(Box<WholeFormula>),
+}
+
+impl From<Target> for Side {
+    fn from(target: Target) -> Self {
+        Self { target, lead: Lead::default() }
+    }
 }
 
 /// Clearance and estimate may differ by this part of the distance.
@@ -80,6 +101,13 @@ const BEYOND: f64 = 1e-9;
 /// Places that are tried where no ray meets the surface.
 const SCATTERED: u32 = 1000;
 
+/// A box with a longer side does not show where something ends.
+const ENDLESS: f64 = 1e30;
+
+/// Places that are kept of a side, and cells that are looked at to find them.
+const MOST_PLACES: usize = 32;
+const CELLS_OF_PLACES: usize = 20_000;
+
 /// Most steps from a cell towards the other side.
 const MOST_STEPS: usize = 12;
 
@@ -92,8 +120,20 @@ const WIDEST_TURN: f64 = 0.5;
 /// Turns of a smaller tangent are not tried.
 const LEAST_TURN: f64 = 1e-6;
 
-/// Rounds of turns, of which each tries all directions.
+/// Rounds of turns, of which each tries all directions, and those without success after which the turns get smaller. From
+/// round to round the directions are turned by the golden angle: along an edge few lead to nearer places.
 const MOST_ROUNDS: usize = 100;
+const FAILURES: u32 = 2;
+const GOLDEN_ANGLE: f64 = 2.399_963_229_728_653;
+
+/// Work that turning may take, so that cells find what it misses.
+const WORK_OF_TURNS: usize = MOST_WORK / 5;
+
+/// The part of its length to which a ray is halved around the surface.
+const FINE: f64 = 1e-12;
+
+/// The same while rays are turned, over the angle of the turn.
+const FINE_OF_TURN: f64 = 1e-6;
 
 /// Halvings of a ray around the surface.
 const HALVINGS: usize = 50;
@@ -109,20 +149,19 @@ impl Solid {
 impl Distances {
     /// Prepares a solid.
     pub fn new(solid: &Solid) -> Self {
-        let (positive, negative) = match solid.parts() {
-            Some(parts) => {
-                let opposite: Arc<[u32]> = words::opposite(&parts.words).into();
-                let tree = |words: Arc<[u32]>| Target::Tree(Tree { parts: parts.clone(), words });
-                (tree(parts.words.clone()), tree(opposite))
-            }
-            None => {
-                let whole = |negated| Target::Whole(Box::new(WholeFormula::of(solid, negated)));
-                (whole(false), whole(true))
-            }
+        let whole = |negated| Target::Whole(Box::new(WholeFormula::of(solid, negated)));
+        // what encloses parts shows where they end, which chains of many edges do not
+        let positive = match solid.parts_with_hulls() {
+            Some(parts) => Target::Tree(Tree { words: parts.words.clone(), parts }),
+            None => whole(false),
+        };
+        let negative = match solid.parts() {
+            Some(parts) => Target::Tree(Tree { words: words::opposite(&parts.words).into(), parts }),
+            None => whole(true),
         };
         let (graph, _) = solid.formula();
         let work_of_sign = 1 + graph.len() / (OPERATIONS_OF_NODE * NODES_PER_WORK);
-        Self { solid: solid.clone(), work_of_sign, positive, negative }
+        Self { solid: solid.clone(), work_of_sign, positive: positive.into(), negative: negative.into() }
     }
 
     /// How far a point is from the surface. All numbers are NaN where the sign is.
@@ -134,16 +173,16 @@ impl Distances {
         if sign == 0.0 {
             return Distance { estimate: 0.0, clearance: 0.0, nearest: p };
         }
-        let target = if sign < 0.0 { &self.positive } else { &self.negative };
+        let Side { target, lead } = if sign < 0.0 { &self.positive } else { &self.negative };
         let (least, most, nearest) = match target {
-            Target::Tree(tree) => self.search(tree, sign, p),
-            Target::Whole(whole) => self.search(&**whole, sign, p),
+            Target::Tree(tree) => self.search((tree, lead), sign, p),
+            Target::Whole(whole) => self.search((&**whole, lead), sign, p),
         };
         Distance { estimate: -sign * most, clearance: least, nearest }
     }
 
     /// A bound from below, one from above, and the point that proves the latter.
-    fn search<S: Shrink>(&self, target: &S, sign: f64, p: DVec3) -> (f64, f64, DVec3) {
+    fn search<S: Shrink>(&self, (target, lead): (&S, &Lead), sign: f64, p: DVec3) -> (f64, f64, DVec3) {
         let mut best = Best {
             solid: &self.solid,
             sign,
@@ -152,9 +191,11 @@ impl Distances {
             point: DVec3::NAN,
             work_of_sign: self.work_of_sign,
             work: Cell::new(MOST_WORK),
+            fineness: FINE,
         };
         self.rays(&mut best);
-        if !best.distance.is_finite() {
+        // where a side ends, all that may hold it is searched for less
+        if !best.distance.is_finite() && !*lead.ends.get_or_init(|| ends(target)) {
             self.rays_all_around(&mut best);
         }
         best.turn();
@@ -166,6 +207,10 @@ impl Distances {
         };
         if !best.distance.is_finite() {
             best.scatter(&around);
+            if !best.distance.is_finite() {
+                best.work.set(MOST_WORK);
+                best.try_places(lead.places.get_or_init(|| self.places(target, -sign)));
+            }
             best.turn();
         }
         // the nearest box comes first
@@ -192,6 +237,30 @@ impl Distances {
             }
         }
         (best.distance.min(reach), best.distance, best.point)
+    }
+
+    /// Places where ω has a sign, from the middles of ever smaller cells, of which the largest comes first.
+    fn places<S: Shrink>(&self, target: &S, sign: f64) -> Vec<DVec3> {
+        let mut found = Vec::new();
+        let Some(hull) = hull(target) else { return found };
+        let queued = |(space, known): (Aabb, S::Known)| Queued { rank: space.size().length(), space, known };
+        let mut queue: BinaryHeap<Queued<S::Known>> = target.parts(&hull).into_iter().map(queued).collect();
+        for _ in 0..CELLS_OF_PLACES {
+            let Some(Queued { space, known, .. }) = queue.pop() else { break };
+            if self.solid.sign(space.centre()) * sign > 0.0 {
+                found.push(space.centre());
+                if found.len() == MOST_PLACES {
+                    break;
+                }
+                continue;
+            }
+            for mut half in halves(&space, DVec3::ZERO) {
+                if let Some(known) = target.shrink(&known, &mut half, Effort::Cell) {
+                    queue.push(queued((half, known)));
+                }
+            }
+        }
+        found
     }
 
     /// Looks for the surface along the normal and the axes, first as far as the contact estimates.
@@ -238,6 +307,8 @@ struct Best<'a> {
     work_of_sign: usize,
     /// What may still be spent on the point.
     work: Cell<usize>,
+    /// The part of their lengths to which rays are halved.
+    fineness: f64,
 }
 
 impl Best<'_> {
@@ -305,6 +376,13 @@ impl Best<'_> {
         }
     }
 
+    /// Tries places of the other side, the nearest first.
+    fn try_places(&mut self, places: &[DVec3]) {
+        let mut places = places.to_vec();
+        places.sort_by(|a, b| self.p.distance_squared(*a).total_cmp(&self.p.distance_squared(*b)));
+        places.into_iter().for_each(|place| self.try_ray(place));
+    }
+
     /// Follows ω towards the other side, with steps that get longer: from the tip of a sharp edge into the
     /// solid, where a cell around the tip has neither middle nor corners.
     fn climb(&mut self, from: DVec3, first: f64) {
@@ -326,24 +404,33 @@ impl Best<'_> {
     /// Turns the ray towards the nearest point as long as that finds nearer ones: to the foot of a face, and
     /// along edges.
     fn turn(&mut self) {
-        let mut angle = WIDEST_TURN;
-        for _ in 0..MOST_ROUNDS {
-            if !self.distance.is_finite() || angle <= LEAST_TURN || self.is_spent() {
-                return;
+        let (mut angle, mut failures) = (WIDEST_TURN, 0);
+        let enough = self.work.get().saturating_sub(WORK_OF_TURNS);
+        for round in 0..MOST_ROUNDS {
+            if !self.distance.is_finite() || angle <= LEAST_TURN || self.work.get() <= enough {
+                break;
             }
             let (before, direction) = (self.distance, (self.point - self.p).normalize_or_zero());
             if direction == DVec3::ZERO {
-                return;
+                break;
             }
+            self.fineness = (FINE_OF_TURN * angle).max(FINE);
             let (u, v) = direction.any_orthonormal_pair();
             for k in 0..TURNS {
-                let (sin, cos) = (f64::from(k) * std::f64::consts::TAU / f64::from(TURNS)).sin_cos();
+                let turned =
+                    f64::from(k) * std::f64::consts::TAU / f64::from(TURNS) + round as f64 * GOLDEN_ANGLE;
+                let (sin, cos) = turned.sin_cos();
                 let other = (direction + angle * (cos * u + sin * v)).normalize();
                 self.try_ray(self.p + before * other);
             }
-            if self.distance >= before * (1.0 - GAP * angle) {
-                angle *= 0.5;
+            failures = if self.distance < before * (1.0 - GAP * angle) { 0 } else { failures + 1 };
+            if failures == FAILURES {
+                (angle, failures) = (0.5 * angle, 0);
             }
+        }
+        self.fineness = FINE;
+        if self.point.is_finite() {
+            self.try_ray(self.point);
         }
     }
 
@@ -364,7 +451,7 @@ impl Best<'_> {
         }
         for _ in 0..HALVINGS {
             let middle = 0.5 * (near + far);
-            if far - near <= 1e-12 * far {
+            if far - near <= self.fineness * far {
                 break;
             }
             if self.is_other(self.p + middle * direction) { far = middle } else { near = middle }
@@ -378,6 +465,17 @@ impl Best<'_> {
             (self.distance, self.point) = (distance, q);
         }
     }
+}
+
+/// A box around a side; `None` if there is nothing of it.
+fn hull<S: Shrink>(target: &S) -> Option<Aabb> {
+    let mut hull = Aabb::new(DVec3::splat(-SEARCH_RADIUS), DVec3::splat(SEARCH_RADIUS));
+    target.shrink(&target.everything(), &mut hull, Effort::Large).map(|_| hull)
+}
+
+/// Whether a side is known to end everywhere, or is empty.
+fn ends<S: Shrink>(target: &S) -> bool {
+    hull(target).is_none_or(|hull| hull.size().max_element() < ENDLESS)
 }
 
 /// A bound of the distance from a box, rounded downwards.

@@ -239,6 +239,11 @@ impl Fold {
             Self::Max => "max",
         }
     }
+
+    /// Whether it has a value without members, as a sum is 0.
+    pub fn has_value_of_none(self) -> bool {
+        matches!(self, Self::Sum | Self::Product)
+    }
 }
 
 /// What the variable of a fold stands for, one after the other.

@@ -53,6 +53,45 @@ fn rounded_and_offset_shapes_end_where_their_parts_do() {
     check("(sphere(1) or box([0,0,0],[2,2,2])).offset(0.5)", [-1.5; 3], [2.5; 3], 1e-5);
 }
 
+/// An offset of a rounded shape is the offset shape with other arcs.
+#[test]
+fn offsets_of_rounded_shapes_have_bounds_and_ranges() {
+    check("box().round(0.1).offset(0.1)", [-0.1; 3], [1.1; 3], 1e-3);
+    check(
+        "box().round(0.1).move([5, 0, 0]).rotate_z(90 deg).offset(-0.05)",
+        [-0.95, 5.05, 0.05],
+        [-0.05, 5.95, 0.95],
+        5e-3,
+    );
+    let moved = solid("box().round(0.1).offset(0.1)");
+    let other = solid("box([-0.1, -0.1, -0.1], [1.1, 1.1, 1.1]).round(0.2)");
+    let mut numbers = Random(4);
+    for _ in 0..1000 {
+        let p = numbers.around(1.5) + 0.5;
+        assert!((moved.omega(p) - other.omega(p)).abs() < 1e-12 || other.omega(p) > 0.2, "{p}");
+    }
+    let range = moved.range(&Aabb::new(DVec3::splat(0.9), DVec3::splat(1.0)));
+    assert!(range.hi - range.lo < 1.0, "{range:?}");
+    let Bounds::Within(cut) = *solid("chamfer(sphere(1), box(), 0.2).round(0.1)").bounds() else { panic!() };
+    assert!(cut.size().max_element() < 2.3, "{cut:?}");
+}
+
+/// Ellipsoids in general position, as written by hand; products of coordinates have no end by themselves.
+#[test]
+fn forms_of_second_degree_end_where_their_matrix_says() {
+    let end = (4.0_f64 / 3.0).sqrt();
+    check("x^2 + y^2 + z^2 - x*y <= 1", [-end, -end, -1.0], [end, end, 1.0], 1e-6);
+    let [a, b] = [1.5_f64.sqrt(), 2_f64.sqrt()];
+    check("x^2 + y^2 + z^2 - x*y - y*z <= 1", [-a, -b, -a], [a, b, a], 1e-6);
+    let y = 8_f64.sqrt();
+    check("(x - 2*y)^2 + (y + z)^2 + (z - 3)^2 <= 4", [-12.0, -3.0 - y, 1.0], [0.0, y - 3.0, 5.0], 1e-6);
+    let (low, high) = ([-2.0 / 3.0, -0.5, 0.0], [2.0, 5.0 / 6.0, end]);
+    check("1 - x^2 - 4*y^2 - z^2 + 2*x*y + x >= 0 and z >= 0", low, high, 1e-3);
+    for text in ["x*y + y*z <= 1", "x^2 + y^2 - 2*x*y + z^2 <= 1", "x^2 + y^2 - z^2 - x*y <= 1"] {
+        assert_eq!(*solid(text).bounds(), Bounds::Unbounded, "{text}");
+    }
+}
+
 /// Bounds that may be too large say so.
 #[test]
 fn bounds_are_tight_or_said_not_to_be() {

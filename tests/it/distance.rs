@@ -1,6 +1,6 @@
 //! Distances with proofs: the true distance lies between clearance and estimate, also where no derivative helps.
 
-use rfm::glam::DVec3;
+use rfm::glam::{DVec2, DVec3};
 use rfm::solid::{Distance, Distances};
 use rfm::{Program, Solid};
 
@@ -85,6 +85,34 @@ fn clearances_in_the_middle_are_a_good_part_of_the_distance() {
             clearance <= nearest && clearance >= 0.9 * (nearest - 0.09),
             "{text}: {clearance}, {nearest}"
         );
+    }
+}
+
+/// Outlines of many edges, each of which goes on beyond the next: no chain of them has an end by itself.
+#[test]
+fn distances_from_finely_cut_outlines_are_found() {
+    for copies in [1, 5, 6, 7, 9] {
+        let text = format!("polygon(arc([0.7, 0], 0.1, 0°, 360°)).extrude(0, 0.4).polar_repeat({copies})");
+        let distances = Distances::new(&solid(&text));
+        let mut numbers = Random(7);
+        let first = DVec3::new(-1.16018, -0.73693, 0.64165);
+        for p in std::iter::once(first).chain((0..40).map(|_| numbers.around(1.4))) {
+            let to_disc = |k: i32| {
+                let (sin, cos) = (f64::from(k) * std::f64::consts::TAU / f64::from(copies)).sin_cos();
+                let beside = (p.truncate() - 0.7 * DVec2::new(cos, sin)).length() - 0.1;
+                let above = (p.z - 0.4).max(-p.z);
+                beside.max(0.0).hypot(above.max(0.0)) + beside.max(above).min(0.0)
+            };
+            let truth = (0..copies).map(to_disc).fold(f64::INFINITY, f64::min);
+            if truth < 0.01 {
+                continue;
+            }
+            // chords are within 1/2000 of the diameter
+            let Distance { estimate, clearance, .. } = distances.at(p);
+            assert!(clearance <= truth + 1.1e-4, "{copies} at {p}: {clearance} for {truth}");
+            let most = 1.001 * truth + 1.1e-4;
+            assert!((truth - 1e-9..=most).contains(&estimate), "{copies} at {p}: {estimate} for {truth}");
+        }
     }
 }
 

@@ -177,6 +177,32 @@ fn a_file_of_points_is_an_outline() {
     }
 }
 
+/// A path from a file that ends where it began is closed for all that follow it, and an outline all the same.
+#[test]
+fn a_path_from_a_file_is_closed_by_its_last_point() {
+    let rows = "0, 0, 0\n1, 0, 0\n1, 1, 0\n0, 1, 0\n0, 0, 0\n";
+    let middle = DVec3::new(0.0, 0.5, 0.0);
+    for path in ["points(\"c.csv\")", "rounded(points(\"c.csv\"), 0.2)"] {
+        assert_eq!(with_file(&format!("sweep({path}, 0.1)"), rows, Engine::Auto).sign(middle), 1.0, "{path}");
+    }
+    // as smooth at its end as elsewhere
+    let ring = with_file("sweep(spline(points(\"c.csv\")), 0.1)", rows, Engine::Auto);
+    assert_eq!([-0.2, 1.2].map(|y| ring.sign(DVec3::new(0.5, y, 0.0))), [1.0, 1.0]);
+    let plate = with_file("polygon(points(\"c.csv\")).extrude(0, 1)", "0 0\n1 0\n1 1\n0 0\n", Engine::Auto);
+    assert_eq!(plate.sign(DVec3::new(0.8, 0.4, 0.5)), 1.0);
+    let numbers = with_file("sphere(count(points(\"c.csv\")))", "1\n2\n1\n", Engine::Auto);
+    assert_eq!(numbers.sign(DVec3::new(2.9, 0.0, 0.0)), 1.0);
+}
+
+/// At the sharp edge of a wing a closed spline would go on round, and cross itself.
+#[test]
+fn a_spline_has_a_corner_where_its_points_turn_back() {
+    let rows = "1, 0\n0.5, 0.06\n0.1, 0.05\n0, 0\n0.1, -0.04\n0.5, -0.03\n1, 0\n";
+    let wing = with_file("polygon(spline(points(\"c.csv\"))).extrude(0, 1)", rows, Engine::Auto);
+    let Bounds::Within(bounds) = *wing.bounds() else { panic!("{:?}", wing.bounds()) };
+    assert!((bounds.max.x - 1.0).abs() < 1e-6, "{bounds:?}");
+}
+
 /// The distance from a chain of segments.
 fn distance(p: DVec3, chain: &[DVec3]) -> f64 {
     let to = |pair: &[DVec3]| {

@@ -242,3 +242,34 @@ fn what_a_choice_cuts_out_is_measured_within_the_error() {
         assert!(off <= figure("volume_error") && figure("volume_error") < 0.01, "{found}, {exact}");
     }
 }
+
+/// Plates as thin as the cells, some of which coarser meshes miss, are measured with more of them.
+#[test]
+fn plates_that_coarse_meshes_miss_are_measured_with_more_cells() {
+    let text = b"rfm 1\nsolid plates = box([0, -0.1, 0], [8, 0, 1]) or box([0, 1, 0], [8, 1.1, 1])";
+    let document = rfm_reading(root(), &["check", "--json", "-"], text).expect(0).json();
+    let solid = &document["solids"][0];
+    assert!((solid["volume"].as_f64().unwrap() - 1.6).abs() < 1e-9, "{solid}");
+    assert!(solid["volume_error"].as_f64().unwrap() < 1e-3, "{solid}");
+    assert_eq!(solid["components"], 2, "{solid}");
+}
+
+/// A gap that cells do not show divides a solid for nobody who counts its parts by them.
+#[test]
+fn components_are_those_of_cells_where_gaps_are_not_resolved() {
+    let text = b"rfm 1\nsolid rings = cylinder(1, 0.3) \\ cylinder(0.6, 1).move([0, 0, -0.5]) or cylinder(0.595, 0.3)";
+    let outcome = rfm_reading(root(), &["check", "-"], text).expect(0);
+    assert!(outcome.stdout.contains("components  1 of what 96 cells show"), "{}", outcome.stdout);
+    let solid = &rfm_reading(root(), &["check", "--json", "-"], text).expect(0).json()["solids"][0];
+    assert_eq!((&solid["resolved"], &solid["components"]), (&false.into(), &1.into()), "{solid}");
+}
+
+/// Where no range of a formula is known, each cell would be divided to the end.
+#[test]
+fn thin_parts_are_not_looked_for_without_ranges() {
+    let text =
+        b"rfm 1\nsolid joint = blend(sphere(1), box(), 0.2).offset(0.1) and box([-2, -2, -2], [2, 2, 2])";
+    let outcome = rfm_reading(root(), &["mesh", "--json", "--cells", "16", "-"], text).expect(0);
+    assert!(outcome.stderr.contains("the ranges of its formula are unknown"), "{}", outcome.stderr);
+    assert!(outcome.json()["thin_cells"].is_null(), "{}", outcome.stdout);
+}

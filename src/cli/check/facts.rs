@@ -184,6 +184,9 @@ fn print_solid(solid: &Facts) {
         let cells = solid.cells.unwrap_or(VOLUME_CELLS);
         let half = cells / 2;
         match coarser == components {
+            true if solid.resolved != Some(true) => {
+                say!("    components  {components} of what {cells} cells show")
+            }
             true => say!("    components  {components} of the solid"),
             false => say!(
                 "    components  {components} of the solid, but {coarser} with {half} cells instead of {cells}; \

@@ -3,18 +3,12 @@
 
 use super::facts::{Box3, Facts, RESOLUTION, VOLUME_CELLS};
 use crate::cli::failure::Failure;
+use crate::cli::hidden::{knows_ranges, without_ranges};
 use rfm::Solid;
 use rfm::field::Field;
 use rfm::geom::{Aabb, to_thousandths};
-use rfm::glam::DVec3;
-use rfm::interval::Interval;
 use rfm::mesh::{self, ByLines, Grid, Mesh, MeshError, Resolution, ThinCells, Volume, VolumeError, Watch};
 use rfm::solid::Bounds;
-
-/// Boxes along each side of a solid in which its range is tried; one in `MOST_UNKNOWN` of them may be
-/// unknown.
-const PROBES: u32 = 16;
-const MOST_UNKNOWN: usize = 50;
 
 /// The most cells on three faces of the bounds with which a solid is measured that is too thin for the usual ones, 512
 /// along each side of a cube, and how often it gets more.
@@ -23,6 +17,10 @@ const REFINED: usize = 3;
 
 /// Cells by which a mesh may fall short of the bounds of its solid: tips and sharp rims are cut off.
 const HIDDEN_CELLS: f64 = 2.0;
+
+/// The part of the volume from which on its error tells of a part that coarser meshes have missed: of plates as thin as
+/// their cells, errors were a tenth of the volume and more.
+const MISSED_PART: f64 = 0.05;
 
 /// What rounding may add to the sums over triangles, relative to them.
 const ROUNDING: f64 = 1e-12;
@@ -48,6 +46,12 @@ pub(super) fn measure(
     let triangles = solid.triangles().map(|(places, triangles)| Mesh::from_triangles(places, triangles));
     if let Some(mesh) = &triangles {
         exact(mesh, &mut facts);
+    }
+    if triangles.is_none() && watch.is_over() {
+        let thin = ThinCells { ended: true, ..ThinCells::NONE };
+        ended_before_meshes(&mut facts);
+        tell_of_end(solid, Some(thin), &mut facts, notes);
+        return Ok((facts, thin));
     }
     let surface = solid.surface(bounds.grown(0.1 * bounds.size().max_element()));
     let grid = match Grid::around(bounds, RESOLUTION) {
@@ -87,7 +91,8 @@ pub(super) fn measure(
         Some(found) => trust_no_more_than(found, &mut facts),
         None => {}
     }
-    if let Some(thin) = thin.filter(|_| facts.resolved == Some(false) || is_hidden) {
+    let is_uncertain = facts.resolved == Some(true) && is_uncertain(&facts);
+    if let Some(thin) = thin.filter(|_| facts.resolved == Some(false) || is_hidden || is_uncertain) {
         refine((solid, &*surface, bounds), (&grid, thin), lines.as_ref(), watch, (&mut facts, notes));
     }
     if facts.resolved == Some(false) && facts.lines.is_none() {
@@ -100,6 +105,11 @@ pub(super) fn measure(
     Ok((facts, thin.unwrap_or(ThinCells::NONE)))
 }
 
+/// Whether the coarser of the meshes are so far off that they must have missed a part.
+fn is_uncertain(facts: &Facts) -> bool {
+    facts.volume.zip(facts.volume_error).is_some_and(|(volume, error)| error > MISSED_PART * volume.abs())
+}
+
 /// Whether the meshes show all parts; `None` where that is not known.
 fn resolved(thin: Option<ThinCells>, facts: &Facts) -> Option<bool> {
     let (solids, coarser) = (facts.components?, facts.components_coarser?);
@@ -107,6 +117,12 @@ fn resolved(thin: Option<ThinCells>, facts: &Facts) -> Option<bool> {
     let no_thin_parts = thin.is_some_and(|thin| thin.count == 0 || thin.is_wedge);
     let is_known = solids != coarser || !no_thin_parts || thin.is_some_and(|thin| !thin.ended);
     is_known.then_some(solids == coarser && no_thin_parts)
+}
+
+/// Says that there was no time for the meshes.
+fn ended_before_meshes(facts: &mut Facts) {
+    facts.unfinished.push("volume");
+    facts.no_volume = Some("its meshes were not finished in time; --budget gives more of it".into());
 }
 
 /// What is known of a solid that is empty.
@@ -155,8 +171,7 @@ fn by_meshes(
         Err(error @ VolumeError::TooFewCells(_)) => return Err(Failure::usage(error)),
         Err(VolumeError::Grid(error)) => return Err(Failure::usage(error)),
         Err(VolumeError::Mesh(MeshError::Ended)) => {
-            facts.unfinished.push("volume");
-            facts.no_volume = Some("its meshes were not finished in time; --budget gives more of it".into());
+            ended_before_meshes(facts);
         }
         Err(VolumeError::Mesh(
             error @ (MeshError::NotANumber { .. } | MeshError::TooManyVertices { .. }),
@@ -326,33 +341,17 @@ fn thin_cells(
     notes: &mut Vec<String>,
 ) -> Option<ThinCells> {
     if !knows_ranges(solid, grid.bounds()) {
-        notes.push(format!(
-            "thin parts of `{}` are not looked for: the ranges of its formula are unknown",
-            solid.name()
-        ));
+        notes.push(without_ranges(solid));
         return None;
     }
     // a formula that is not a number somewhere has no such search; its volume has reported it
     mesh::thin_cells(surface, grid, watch).ok()
 }
 
-/// Whether ranges say anything about the solid nearly everywhere in a box. Where they do not, a search for
-/// thin parts would divide every cell to the end.
-fn knows_ranges(solid: &Solid, bounds: &Aabb) -> bool {
-    let size = bounds.size() / f64::from(PROBES);
-    let probe = |i: u32| {
-        let place =
-            DVec3::new(f64::from(i % PROBES), f64::from(i / PROBES % PROBES), f64::from(i / PROBES.pow(2)));
-        let low = bounds.min + size * place;
-        solid.range(&Aabb::new(low, low + size)) == Interval::ALL
-    };
-    let unknown = (0..PROBES.pow(3)).filter(|&i| probe(i)).count();
-    unknown * MOST_UNKNOWN <= PROBES.pow(3) as usize
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
+    use rfm::glam::DVec3;
     use rfm::{Engine, Program};
 
     #[test]

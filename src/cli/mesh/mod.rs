@@ -13,7 +13,7 @@ use std::time::Instant;
 use super::args::{Mesh as Options, MeshMethod};
 use super::deadline::{self, Deadline};
 use super::failure::{Failure, complain, note};
-use super::hidden::hidden;
+use super::hidden::{hidden, knows_ranges, without_ranges};
 use super::shared::Shared;
 use super::{choose, input, output, progress};
 use crate::cli::output::Shown;
@@ -80,7 +80,7 @@ pub(super) fn run(shared: &Shared, options: &Options) -> Result<(), Failure> {
     let report = mesh::check(&mesh, &*surface);
     let thin = match &grid {
         None => ThinCells::NONE,
-        Some(grid) => thin_cells(&*surface, grid, options, times.meshing)?,
+        Some(grid) => thin_cells((&solid, &*surface), grid, options, times.meshing)?,
     };
     times.checking = milliseconds(started);
     remark(&solid, &mesh, (&thin, grid.as_ref()), options);
@@ -113,13 +113,17 @@ pub(super) fn run(shared: &Shared, options: &Options) -> Result<(), Failure> {
 pub(super) const LEAST_SEARCH: f64 = 10.0;
 const SEARCH_PER_MESHING: f64 = 3.0;
 
-/// What the mesh misses. `meshing` is how long it took, ms.
+/// What the mesh misses. Without ranges the search does not begin, and counts as ended. `meshing` is how long that took,
+/// ms.
 fn thin_cells(
-    surface: &dyn Field,
+    (solid, surface): (&Solid, &dyn Field),
     grid: &Grid,
     options: &Options,
     meshing: f64,
 ) -> Result<ThinCells, Failure> {
+    if options.budget.is_none() && !knows_ranges(solid, grid.bounds()) {
+        return Ok(ThinCells { ended: true, ..ThinCells::NONE });
+    }
     let own = LEAST_SEARCH.max(SEARCH_PER_MESHING * 1e-3 * meshing);
     mesh::thin_cells(surface, grid, &Deadline::after(options.budget.unwrap_or(own))).map_err(Failure::usage)
 }
@@ -312,11 +316,15 @@ fn remark(solid: &Solid, mesh: &Mesh, (thin, grid): (&ThinCells, Option<&Grid>),
         };
         note(format!("{what} {}", hidden(thin, grid)));
     }
-    if thin.ended {
-        note(
+    match (thin.ended, grid) {
+        (true, Some(grid)) if options.budget.is_none() && !knows_ranges(solid, grid.bounds()) => {
+            note(without_ranges(solid));
+        }
+        (true, _) => note(
             "the search for what the mesh misses was ended before all of the surface was looked at; --budget gives \
              it more time",
-        );
+        ),
+        (false, _) => {}
     }
     if mesh.triangles.is_empty() {
         note(format!("`{}` has no surface here: {}", solid.name(), why_empty(solid, options)));

@@ -55,6 +55,9 @@ pub(super) fn run(shared: &Shared, options: &Run) -> Result<(), Failure> {
     if options.dry_run {
         let goal = Goal::of(options, &experiment)?;
         frames_fit(options, goal, &experiment)?;
+        if !options.resume {
+            input::show(&lints::of_experiment(&experiment, &mut lints::Searches::short()));
+        }
         return forecast::dry_run(shared, options, &experiment, goal, latest()?.as_ref());
     }
     // a run that is writing there is told of before what it has written so far

@@ -6,6 +6,7 @@ use smallvec::SmallVec;
 
 use super::backward;
 use super::forward::{POSITIVE, numbers};
+use super::quadric::is_quadric;
 use super::rule::{Degree, Rule};
 use super::sets::meet;
 use crate::geom::Aabb;
@@ -30,6 +31,8 @@ pub struct Contractor {
     /// Linear forms that are operands of something else, or the root.
     pub(super) forms: Vec<Node>,
     coordinates: [Option<Node>; 3],
+    /// Whether the root is a form of second degree.
+    pub(super) is_quadric: bool,
     pub(super) tables: Tables,
 }
 
@@ -102,6 +105,7 @@ impl Contractor {
         let coordinates = Axis::SPACE.map(|axis| graph.find(Expr::Coordinate(axis)));
         let tables = graph.tables().clone();
         Self {
+            is_quadric: is_quadric(&rules, root),
             rules,
             degrees,
             root,

@@ -3,6 +3,7 @@
 use super::contractor::{Contractor, SCRATCH, Wanted};
 use super::forms;
 use super::linear::LinearForm;
+use super::quadric::ellipsoid;
 use super::sets::Contracted;
 use crate::geom::Aabb;
 use crate::ir::bounds::range::Region;
@@ -40,10 +41,14 @@ impl Contractor {
                 Some(false) => match self.read_box(&scratch.values, space) {
                     None => Contracted::Nowhere,
                     Some(()) => {
-                        if let Some(found) = found {
-                            forms::collect(self, &self.forms, scratch, found);
+                        let Some(found) = found else { return Contracted::Somewhere };
+                        forms::collect(self, &self.forms, scratch, found);
+                        if self.is_quadric
+                            && let Some(around) = ellipsoid(self, &scratch.values, wanted.negated)
+                        {
+                            *space = space.intersection(&around);
                         }
-                        Contracted::Somewhere
+                        if space.is_empty() { Contracted::Nowhere } else { Contracted::Somewhere }
                     }
                 },
             }

@@ -11,6 +11,7 @@
 //! | `hull` | a box made smaller by values (hull consistency) |
 //! | `slopes` | a box made smaller by derivatives (the mean value form) |
 //! | `linear` | linear forms with known ranges, and the box around them (linear programming) |
+//! | `quadric` | the box around an ellipsoid |
 //!
 //! Intervals here hold the *numbers* that a node may be. Where a formula is positive every operand that it
 //! needs is a number, so an undefined operation restricts its operands and does not make the whole formula
@@ -26,6 +27,7 @@ mod forms;
 mod forward;
 mod hull;
 mod linear;
+mod quadric;
 mod reach;
 mod rule;
 mod sets;

@@ -24,8 +24,15 @@ const CELLS_OF_SIDE: usize = 600;
 /// Work for one side, in the unit below: fewer cells of a large solid. It is some tenths of a second.
 const WORK_OF_SIDE: usize = 200_000;
 
+/// Work for all sides together, each of which may take an equal part of what is left: a second or two, for solids that are
+/// joined by arcs, of which each cell needs nearly all leaves.
+const WORK_OF_SOLID: usize = 240_000;
+
 /// Nodes of formulas that make a unit of work.
 pub const NODES_PER_WORK: usize = 16;
+
+/// The sides of a box.
+const SIDES: usize = 6;
 
 /// How often a side is looked for, each time in a box of which the longest side is less than half as long.
 const MOST_REPEATS: usize = 4;
@@ -116,21 +123,25 @@ pub fn search<S: Shrink>(solid: &S) -> Option<Found> {
     // a solid that does not end on one side need not be measured on the others
     let (open, closed): (Vec<Side>, Vec<Side>) = Side::all().partition(|side| side.is_open(&hull));
     let mut is_tight = true;
-    for side in open.into_iter().chain(closed) {
+    let mut left = WORK_OF_SOLID;
+    for (number, side) in open.into_iter().chain(closed).enumerate() {
         let mut is_near = false;
+        let share = (left / (SIDES - number)).min(WORK_OF_SIDE);
+        let mut work = share;
         // what is near enough is a part of the longest side, which may have been far too long
         for _ in 0..MOST_REPEATS {
             let longest = longest_side(&hull);
             let reach;
-            (reach, cells) = Faces { solid, side, hull }.find(cells)?;
+            (reach, cells) = Faces { solid, side, hull }.find(cells, &mut work)?;
             is_near = reach.is_near;
             side.set(&mut hull, reach.farthest);
             let held = cells.iter().fold(Aabb::EMPTY, |held, (space, _)| held.union(space));
             hull = hull.intersection(&held);
-            if longest_side(&hull) > 0.5 * longest {
+            if work == 0 || longest_side(&hull) > 0.5 * longest {
                 break;
             }
         }
+        left -= share - work;
         is_tight &= is_near;
         if side.is_open(&hull) {
             break;
@@ -162,8 +173,9 @@ struct Reach {
 type Cells<K> = Vec<(Aabb, K)>;
 
 impl<S: Shrink> Faces<'_, S> {
-    /// How far the solid reaches, and cells that hold it; `None` if there is no part of it.
-    fn find(&self, parts: Cells<S::Known>) -> Option<(Reach, Cells<S::Known>)> {
+    /// How far the solid reaches, and cells that hold it; `None` if there is no part of it. `work` is what may still be
+    /// spent.
+    fn find(&self, parts: Cells<S::Known>, work: &mut usize) -> Option<(Reach, Cells<S::Known>)> {
         let (side, hull) = (self.side, self.hull);
         let cell = |(space, known): (Aabb, S::Known)| {
             let space = space.intersection(&hull);
@@ -173,20 +185,20 @@ impl<S: Shrink> Faces<'_, S> {
         let mut queue: BinaryHeap<Queued<S::Known>> = parts.into_iter().filter_map(cell).collect();
         // how far out a point of the solid is known
         let mut found = f64::NEG_INFINITY;
-        let (mut cells, mut work) = (0, WORK_OF_SIDE);
+        let mut cells = 0;
         loop {
             let farthest = queue.pop()?;
             let goal = self.goal(&farthest, cells);
             if farthest.rank - found > goal {
                 found = found.max(self.farthest_point(&farthest, goal));
             }
-            if farthest.rank - found <= goal || cells == CELLS_OF_SIDE || work == 0 {
+            if farthest.rank - found <= goal || cells == CELLS_OF_SIDE || *work == 0 {
                 let reach = Reach { farthest: farthest.rank, is_near: farthest.rank - found <= goal };
                 queue.push(farthest);
                 return Some((reach, queue.into_iter().map(|cell| (cell.space, cell.known)).collect()));
             }
             cells += 1;
-            work = work.saturating_sub(self.solid.work(&farthest.known));
+            *work = work.saturating_sub(self.solid.work(&farthest.known));
             for mut half in halves(&farthest.space, DVec3::ZERO) {
                 if let Some(known) = self.solid.shrink(&farthest.known, &mut half, Effort::Cell) {
                     queue.push(Queued { rank: side.of(&half), space: half, known });

@@ -25,7 +25,7 @@ impl Slip<'_> {
                 .or_else(|| self.function_by_let())
                 .or_else(|| self.obstacle_by_a_shape())
                 .or_else(|| self.power_of_a_function()),
-            "[" => self.range_in_brackets(),
+            "[" => self.range_in_brackets().or_else(|| self.box_as_two_corners()),
             ":" => self
                 .type_of_a_param()
                 .or_else(|| self.value_behind_a_colon())
@@ -217,6 +217,18 @@ impl Slip<'_> {
         let are_vectors = [low, high].into_iter().all(|end| end.starts_with('[') && end.ends_with(']'));
         let is_box = matches!(foreign::key(key.trim()).unwrap_or(key.trim()), "box");
         (is_box && are_vectors && fits(&[low, high]))
+            .then(|| self.unexpected().help(format!("write `box {{ min: {low}, max: {high} }}`")))
+    }
+
+    /// `box: [0, 0, 0], [1, 1, 1]`
+    fn box_as_two_corners(&self) -> Option<Diagnostic> {
+        let (before, low) = self.on_its_line().rsplit_once(':')?;
+        let low = low.trim().strip_suffix(',')?.trim_end();
+        let rest = &self.text[self.at..];
+        let high = &rest[..=rest.find([']', '\n']).filter(|&end| rest[end..].starts_with(']'))?];
+        let key = last_word(before.trim_end());
+        let is_box = matches!(foreign::key(key).unwrap_or(key), "box");
+        (is_box && low.starts_with('[') && low.ends_with(']') && fits(&[low, high]))
             .then(|| self.unexpected().help(format!("write `box {{ min: {low}, max: {high} }}`")))
     }
 

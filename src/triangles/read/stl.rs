@@ -22,7 +22,11 @@ pub fn read(bytes: &[u8]) -> Result<Vec<[DVec3; 3]>, String> {
     }
     match expected {
         Some(expected) => Err(format!("it has {} bytes, and its header says {expected}", bytes.len())),
-        None => Err("it is too short".into()),
+        None if bytes.is_empty() => Err("it is empty".into()),
+        None => Err(format!(
+            "it is no text that begins with `solid`, and {} bytes are too few for the {HEADER} of a binary file",
+            bytes.len()
+        )),
     }
 }
 

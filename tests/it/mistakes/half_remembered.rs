@@ -23,6 +23,8 @@ const TEXTS: &[&str] = &[
     "param r = 10 mm in (5, 20) \"radius\"\nsolid s = sphere(r)",
     "param r: 1 mm .. 5 mm\nsolid s = sphere(r)",
     "param r: 2\nsolid s = sphere(r)",
+    "solid s = sphr(2)",
+    "solid s = sphere(0.1).repeat(2, 3)",
     "solid s = sphere(1).shell(-0.1)",
     "solid s = sphere(1).shell(-2 mm)",
     "solid s = box(center=[0, 0, 0], size=[1, 1, 1])",

@@ -87,6 +87,7 @@ const SCENES: &[&str] = &[
     "inlet { velocity: [1, 0, 0] }",
     "time_step: 0.001 s",
     "box: [0, 0, 0] .. [1, 1, 1]",
+    "box: [0, 0, 0], [1, 1, 1]",
     "run { until: sqrt(2) s }",
     "probe load { force: post, known: [0, 0, -490.5*sqrt(2) N] }",
     "fluid { shape: ball([0.5, 0.5, 0.7], 0.2), spacing: 5 cm, nu: 1e-6 }",

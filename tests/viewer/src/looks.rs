@@ -113,8 +113,8 @@ pub fn bodies(room: &mut Room) {
         Picture::of(&room.scene())
     };
     room.browser.choose("#body-0", "as all");
-    assert_eq!(room.browser.eval(looks), "gate opaque,blade hidden");
     let with_gate = Picture::of(&room.scene());
+    assert_eq!(room.browser.eval(looks), "gate opaque,blade hidden");
     assert!(with_gate.difference(&both_away) > 1.0, "{}", with_gate.difference(&both_away));
     room.shot("bodies");
     let said = "besides(viewer.look, viewer.setting.bodies, 0, viewer.scene.solid)";
