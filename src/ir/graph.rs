@@ -112,8 +112,6 @@ pub struct Graph {
     tables: Tables,
     /// See [`Graph::enclose`].
     hulls: FxHashMap<Node, Node>,
-    /// Fields that were made as distances, see [`Graph::state_distance`].
-    distances: FxHashSet<Node>,
 }
 
 impl Graph {
@@ -333,29 +331,6 @@ impl Graph {
             .collect();
         enclosed.sort_unstable();
         enclosed
-    }
-
-    /// States that a field is a distance from its surface, as well as one is known: its slope need not be looked for.
-    /// Graphs that are taken out of this one know nothing of it.
-    pub fn state_distance(&mut self, field: Node) {
-        self.distances.insert(field);
-    }
-
-    /// Whether a field was made as a distance.
-    pub fn is_distance(&self, field: Node) -> bool {
-        self.distances.contains(&field)
-    }
-
-    /// The node with x, y, z replaced by those of a place that moves with the shape: what is a distance stays one.
-    pub fn substitute_rigidly(&mut self, root: Node, coordinates: [Node; 3]) -> Node {
-        let cone = self.cone(root);
-        let distances: Vec<Node> = cone.into_iter().filter(|node| self.is_distance(*node)).collect();
-        let moved = self.substitute(root, coordinates);
-        for field in distances {
-            let field = self.substitute(field, coordinates);
-            self.state_distance(field);
-        }
-        moved
     }
 
     /// The node with x, y, z replaced: the same shape in other coordinates, at the same time.

@@ -78,11 +78,8 @@ impl Lowering<'_> {
     /// A formula whose surface is moved outwards: by its distance, or by g = |∇ω| to first order.
     fn offset_leaf(&mut self, side: Side, length: Node, within: Option<Aabb>, span: Span) -> Node {
         let half = self.known_value(length).map_or(1.0, |length| (4.0 * length.abs()).max(1.0));
-        let is_distance = self.module.graph.is_distance(side.node);
-        let exact = if is_distance { None } else { self.exact_distance(side.node, (within, half), span) };
-        let (field, by, square) = match exact {
+        let (field, by, square) = match self.exact_distance(side.node, (within, half), span) {
             Some(distance) => (distance.field, length, distance.square),
-            None if is_distance => (side.node, length, None),
             None => {
                 let slope = self.slope_of_leaf(side.node, span);
                 (side.node, self.binary(Binary::Mul, length, slope, span), None)
@@ -90,9 +87,6 @@ impl Lowering<'_> {
         };
         let field = self.signed(field, side.negated, span);
         let moved = self.binary(Binary::Add, field, by, span);
-        if is_distance {
-            self.module.graph.state_distance(moved);
-        }
         if let Some(square) = square.filter(|_| !side.negated) {
             let hull = self.offset_square(side.node, square, length, span);
             self.module.graph.enclose(moved, hull);

@@ -139,7 +139,6 @@ impl Lowering<'_> {
         let short = self.length_of_positive(short_a, short_b, span);
         let level = self.binary(Binary::Max, radii.outer, least, span);
         let arc = self.binary(Binary::Sub, level, short, span);
-        self.module.graph.state_distance(arc);
         // never above the least but for rounding; said twice, bounds are found from either part
         let field = self.binary(Binary::Min, least, arc, span);
         let around = self.binary(Binary::Min, parts[0].around, parts[1].around, span);
@@ -155,7 +154,6 @@ impl Lowering<'_> {
         let negative = self.unary(Unary::Neg, radius, span);
         let level = self.binary(Binary::Min, negative, most, span);
         let arc = self.binary(Binary::Add, level, over, span);
-        self.module.graph.state_distance(arc);
         let part = self.constant(FILLET);
         let wider = self.binary(Binary::Mul, part, radius, span);
         let around = self.binary(Binary::Max, parts[0].around, parts[1].around, span);
@@ -193,7 +191,6 @@ impl Lowering<'_> {
         let root = self.unary(Unary::Sqrt, sum, span);
         let field = self.binary(Binary::DivOrZero, leaf, root, span);
         self.module.graph.enclose(field, leaf);
-        self.module.graph.state_distance(field);
         Known { field, greatest: f64::INFINITY, square: None }
     }
 }

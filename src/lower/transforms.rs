@@ -270,7 +270,7 @@ impl<'a> Lowering<'a> {
             Transform::Move => {
                 let by = self.as_vector(first, *at)?;
                 let q = std::array::from_fn(|i| self.binary(Binary::Sub, p[i], by[i], span));
-                Some(self.module.graph.substitute_rigidly(shape, q))
+                Some(self.module.graph.substitute(shape, q))
             }
             Transform::RotateAbout(axis) => {
                 let turn = self.angle(first, *at)?;
@@ -302,7 +302,7 @@ impl<'a> Lowering<'a> {
                 let angle = self.angle(&values[1].0, values[1].1)?;
                 let axis = self.unit_vector(axis, *at)?;
                 let q = self.rotated_back(p, axis, angle, span);
-                Some(self.module.graph.substitute_rigidly(shape, q))
+                Some(self.module.graph.substitute(shape, q))
             }
             Transform::Scale => self.scale(shape, p, first, *at, span),
             Transform::Mirror => {
@@ -323,7 +323,7 @@ impl<'a> Lowering<'a> {
         let back = self.negative(sin, span);
         q[j] = self.combination(&[(cos, p[j]), (sin, p[k])], span);
         q[k] = self.combination(&[(back, p[j]), (cos, p[k])], span);
-        self.module.graph.substitute_rigidly(shape, q)
+        self.module.graph.substitute(shape, q)
     }
 
     /// A shape that is mirrored at the plane through the origin with the unit normal `n`: p − 2(p·n)n.
@@ -335,7 +335,7 @@ impl<'a> Lowering<'a> {
             });
             self.combination(&row, span)
         });
-        self.module.graph.substitute_rigidly(shape, q)
+        self.module.graph.substitute(shape, q)
     }
 
     /// The transformation about a place instead of the origin.
@@ -349,10 +349,10 @@ impl<'a> Lowering<'a> {
     ) -> Option<Node> {
         let p = Axis::SPACE.map(|axis| self.module.graph.coordinate(axis));
         let ahead = std::array::from_fn(|i| self.binary(Binary::Add, p[i], place[i], span));
-        let at_origin = self.module.graph.substitute_rigidly(shape, ahead);
+        let at_origin = self.module.graph.substitute(shape, ahead);
         let transformed = self.transformed(at_origin, transform, values, span)?;
         let back = std::array::from_fn(|i| self.binary(Binary::Sub, p[i], place[i], span));
-        Some(self.module.graph.substitute_rigidly(transformed, back))
+        Some(self.module.graph.substitute(transformed, back))
     }
 
     /// Scales about the origin. ω is scaled too (by the smallest factor), so that its gradient keeps its

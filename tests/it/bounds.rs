@@ -53,25 +53,9 @@ fn rounded_and_offset_shapes_end_where_their_parts_do() {
     check("(sphere(1) or box([0,0,0],[2,2,2])).offset(0.5)", [-1.5; 3], [2.5; 3], 1e-5);
 }
 
-/// An offset of a rounded shape is the offset shape with other arcs.
+/// A chamfer that is rounded ends where it did, and by the radius less at its edges.
 #[test]
-fn offsets_of_rounded_shapes_have_bounds_and_ranges() {
-    check("box().round(0.1).offset(0.1)", [-0.1; 3], [1.1; 3], 1e-3);
-    check(
-        "box().round(0.1).move([5, 0, 0]).rotate_z(90 deg).offset(-0.05)",
-        [-0.95, 5.05, 0.05],
-        [-0.05, 5.95, 0.95],
-        5e-3,
-    );
-    let moved = solid("box().round(0.1).offset(0.1)");
-    let other = solid("box([-0.1, -0.1, -0.1], [1.1, 1.1, 1.1]).round(0.2)");
-    let mut numbers = Random(4);
-    for _ in 0..1000 {
-        let p = numbers.around(1.5) + 0.5;
-        assert!((moved.omega(p) - other.omega(p)).abs() < 1e-12 || other.omega(p) > 0.2, "{p}");
-    }
-    let range = moved.range(&Aabb::new(DVec3::splat(0.9), DVec3::splat(1.0)));
-    assert!(range.hi - range.lo < 1.0, "{range:?}");
+fn a_chamfer_that_is_rounded_has_bounds() {
     let Bounds::Within(cut) = *solid("chamfer(sphere(1), box(), 0.2).round(0.1)").bounds() else { panic!() };
     assert!(cut.size().max_element() < 2.3, "{cut:?}");
 }
