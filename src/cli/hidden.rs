@@ -1,4 +1,4 @@
-//! What a grid of cells cannot show, in words.
+//! What a grid of cells cannot show, in words, and whether it can be looked for.
 
 use rfm::Solid;
 use rfm::geom::{Aabb, to_thousandths};

@@ -321,7 +321,7 @@ measures it is told if it is thinner than one and a half spacings: kernels befor
 is behind it the fluid is pressed against it harder than it should be. The message says how thin it is, where, and what
 spacing is small enough. Parts that extend over less than two spacings, and the tips of wedges, do not count.
 
-An obstacle that is smaller than a particle as a whole, or a rod of less than half its width, is told of too: particles flow past
+An obstacle that is smaller than a particle as a whole, or a rod thinner than half a particle, is told of too: particles flow past
 it almost as if it were not there. The spacing may follow from the number of particles, 10 000 unless it is stated.";
 DRY_WALL = "W0518":
 "The fluid's shape tapers off between an obstacle and another wall, and becomes thinner than a particle: below a cylinder that

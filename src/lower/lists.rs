@@ -76,7 +76,10 @@ impl Lowering<'_> {
                 let span = self.user_span(span);
                 let message = format!("a list with {} members has no member {at}", members.len());
                 let diagnostic = Diagnostic::error(Code::OUT_OF_RANGE, span, message);
-                self.fail(diagnostic.help(format!("members are counted from 0 to {}", members.len() - 1)))
+                self.fail(match members.len().checked_sub(1) {
+                    Some(last) => diagnostic.help(format!("members are counted from 0 to {last}")),
+                    None => diagnostic,
+                })
             }
         }
     }

@@ -495,7 +495,8 @@ impl Audit {
         (self.too_fast > MOST_TOO_FAST).then(|| {
             let (sound, speed) = (significant(parameters.sound_speed()), significant(self.max_speed));
             let derived = if parameters.states_sound_speed() { "" } else { " derived" };
-            let wanted = (10.0 * self.max_speed).ceil();
+            let wanted = format!("{:.1e}", 10.0 * self.max_speed);
+            let wanted: f64 = wanted.parse().unwrap_or(10.0 * self.max_speed);
             format!(
                 "the fluid reached {speed} m/s, with a{derived} speed of sound of {sound} m/s: there it is a gas, and its \
                  forces are not those of a liquid; state `sound_speed: {wanted} m/s`"
@@ -513,7 +514,8 @@ impl Audit {
     }
 }
 
-/// The speed above which the fluid is a gas, m/s; `None` if the method does not stand for a liquid by its sound.
+/// The speed above which the fluid is a gas, m/s; `None` if the method does not stand for a liquid by its sound: one that keeps
+/// its density has none, and the one whose walls have no density, the paper's, is far from a liquid anyway.
 fn greatest_speed(parameters: &Parameters) -> Option<f64> {
     let is_weakly_compressible = parameters.walls_have_density() && !parameters.keeps_density();
     is_weakly_compressible.then(|| MOST_MACH * parameters.sound_speed())

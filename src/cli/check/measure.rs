@@ -91,9 +91,12 @@ pub(super) fn measure(
         Some(found) => trust_no_more_than(found, &mut facts),
         None => {}
     }
-    let is_uncertain = facts.resolved == Some(true) && is_uncertain(&facts);
-    if let Some(thin) = thin.filter(|_| facts.resolved == Some(false) || is_hidden || is_uncertain) {
+    let misses_parts = facts.resolved == Some(true) && is_uncertain(&facts);
+    if let Some(thin) = thin.filter(|_| facts.resolved == Some(false) || is_hidden || misses_parts) {
         refine((solid, &*surface, bounds), (&grid, thin), lines.as_ref(), watch, (&mut facts, notes));
+    }
+    if facts.resolved == Some(true) && is_uncertain(&facts) {
+        facts.resolved = None;
     }
     if facts.resolved == Some(false) && facts.lines.is_none() {
         // three grids may agree about what all of them miss

@@ -113,7 +113,7 @@ pub(super) fn run(shared: &Shared, options: &Options) -> Result<(), Failure> {
 pub(super) const LEAST_SEARCH: f64 = 10.0;
 const SEARCH_PER_MESHING: f64 = 3.0;
 
-/// What the mesh misses. Without ranges the search does not begin, and counts as ended. `meshing` is how long that took,
+/// What the mesh misses. Without ranges the search does not begin, and counts as ended. `meshing` is how long the meshing took,
 /// ms.
 fn thin_cells(
     (solid, surface): (&Solid, &dyn Field),

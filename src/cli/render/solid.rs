@@ -31,7 +31,7 @@ const MOST_PICTURES: f64 = 100_000.0;
 
 pub(super) fn run(shared: &Shared, options: &Render) -> Result<(), Failure> {
     let path = options.subject.as_path();
-    if path != Path::new("-") && !path.exists() {
+    if path != Path::new("-") && matches!(path.try_exists(), Ok(false)) {
         return Err(input::missing(path));
     }
     if let Some(flag) = options.flag_of_runs() {

@@ -60,7 +60,7 @@ pub(super) fn run(shared: &Shared, options: &View) -> Result<(), Failure> {
             }
         };
     }
-    if path != Path::new("-") && !path.exists() {
+    if path != Path::new("-") && matches!(path.try_exists(), Ok(false)) {
         return Err(input::missing(path));
     }
     if options.save.is_some() {

@@ -26,6 +26,9 @@ const LONGEST: f64 = 1e3;
 /// Numbers with wider ranges than this part of them are not known well enough.
 const NARROW: f64 = 1e-13;
 
+/// Smaller coefficients have lost digits.
+const LEAST_CURVED: f64 = 1e-280;
+
 /// Rounding of a coefficient beside that of the operations that make it.
 const ROUNDINGS: f64 = 1024.0;
 
@@ -92,7 +95,9 @@ pub fn ellipsoid(contractor: &Contractor, values: &[Interval], negated: bool) ->
     }
     let form = forms.pop()??;
     let sign = if negated { 1.0 } else { -1.0 };
-    around(&form, sign, (root as f64 + ROUNDINGS) * f64::EPSILON)
+    // two linear forms are multiplied, and both the formula and its coefficients are rounded
+    let rounding = 4.0 * root as f64 * (f64::EPSILON + NARROW) + ROUNDINGS * f64::EPSILON;
+    around(&form, sign, rounding)
 }
 
 fn number(value: Interval) -> Option<Form> {
@@ -188,12 +193,11 @@ fn around(form: &Form, sign: f64, rounding: f64) -> Option<Aabb> {
     }
     let (curvatures, axes) = eigen(matrix);
     let (least, most) = (curvatures.min_element(), curvatures.max_element());
-    let size = |part: &[Coefficient]| part.iter().fold(0.0_f64, |most, c| most.max(c.size));
     // what rounding makes of the terms of each degree
     let [bent, sloped, level] = [&form[..LINEAR], &form[LINEAR..NUMBER], &form[NUMBER..]]
-        .map(|part| part.len() as f64 * rounding * size(part));
-    let is_flat = least.is_nan() || least * LONGEST * LONGEST <= most || 64.0 * bent >= least;
-    if is_flat {
+        .map(|part| rounding * part.iter().map(|c| c.size).sum::<f64>());
+    let is_known = most > LEAST_CURVED && 64.0 * bent < least && least * LONGEST * LONGEST > most;
+    if !is_known {
         return None;
     }
     let inverse = axes * DMat3::from_diagonal(curvatures.recip()) * axes.transpose();
@@ -205,7 +209,8 @@ fn around(form: &Form, sign: f64, rounding: f64) -> Option<Aabb> {
     let length = (square.abs() / least).sqrt().max(farthest).max(f64::MIN_POSITIVE);
     let lost = 2.0 * bent + sloped / (2.0 * length);
     let error = 2.0 * bent * farthest * farthest + sloped * (farthest + 0.5 * length) + level;
-    if 4.0 * lost >= least {
+    let is_convex = 4.0 * lost < least;
+    if !is_convex {
         return None;
     }
     let grown = (square + error + ROUNDINGS * f64::EPSILON * square.abs()) / (1.0 - lost / least);

@@ -21,7 +21,7 @@ const OPEN: f64 = SEARCH_RADIUS * 1e-12;
 /// Maximum number of cells looked at for one side.
 const CELLS_OF_SIDE: usize = 600;
 
-/// Work for one side, in the unit below: fewer cells of a large solid. It is some tenths of a second.
+/// The most work for one side, in the unit below: fewer cells of a large solid. It is some tenths of a second.
 const WORK_OF_SIDE: usize = 200_000;
 
 /// Work for all sides together, each of which may take an equal part of what is left: a second or two, for solids that are

@@ -21,7 +21,7 @@ class Viewer {
     this.run = { number: 0, playing: false, speed: 1 };
     this.stats = { draws: 0, milliseconds: 0 };
     this.look = {
-      colours: sceneColours(), obstacle: "opaque", bodies: {}, surface: "automatic", water: "transparent", particles: !setting.has_surface, box: true, array: 0, map: "blue–yellow–red", fixed: null, blend: true,
+      colours: sceneColours(), obstacle: "opaque", bodies: Object.create(null), surface: "automatic", water: "transparent", particles: !setting.has_surface, box: true, array: 0, map: "blue–yellow–red", fixed: null, blend: true,
       cutting: { axis: "none", part: 0.5, flipped: false, solid: true, fluid: true }, turns: false, gravityInRoom: true,
       slicing: { axis: "none", part: 0.5 }, arrows: false, arrowLength: 1, trails: false, trailFrames: 12,
     };
@@ -398,8 +398,10 @@ class Viewer {
     look.ratio = ratio;
     if (!this.isJudged && scene.solid && frames?.from.count > 0) {
       this.isJudged = true;
-      if (scene.hiddenPart(look, view, projection, frames) > MOST_HIDDEN) byId("obstacle").value = look.obstacle = "transparent";
-      this.settle();
+      if (scene.hiddenPart(look, view, projection, frames) > MOST_HIDDEN) {
+        byId("obstacle").value = look.obstacle = "transparent";
+        this.settle();
+      }
     }
     scene.draw(look, view, projection, frames, timeline);
     const seen = { view, all: times(projection, view) };

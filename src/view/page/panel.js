@@ -157,7 +157,8 @@ function showParams(params) {
 /** The looks of single obstacles, where there are several of them, and not so many that nobody would look for one. */
 function bodiesGroup(viewer) {
   const { look, setting: { bodies } } = viewer;
-  if (bodies.length < 2 || bodies.length > 40) return null;
+  const isShort = bodies.length > 1 && bodies.length <= 40;
+  if (!isShort && Object.keys(look.bodies).length === 0) return null;
   const one = (name, k) =>
     row(name, choice(`body-${k}`, ["as all", "opaque", "transparent", "hidden"], look.bodies[name] ?? "as all", (value) => {
       if (value === "as all") delete look.bodies[name];

@@ -85,9 +85,10 @@ class Scene {
     return this.parts.solid;
   }
 
-  /** Whether a part of the solids has a look. Parts are told apart where each of them is a body that has a name. */
+  /** Whether a part of the solids has a look. A mesh may hold several bodies as one part; the last bodies may have none. */
   hasLook(look, k, wanted) {
-    return (this.solid.triangles.length <= look.looks.length ? look.looks[k] : look.obstacle) === wanted;
+    const [parts, names] = [this.solid.triangles.length, look.looks.length];
+    return (parts <= names && (parts > 1 || names === 1) ? look.looks[k] : look.obstacle) === wanted;
   }
 
   /** Whether any part of the solids has a look. */
