@@ -295,7 +295,7 @@ fn refusals_say_why() {
     let here = folder.path();
     run(here);
     std::fs::write(here.join("swing.rfm"), SWING).unwrap();
-    let cases: [(&[&str], &str); 23] = [
+    let cases: [(&[&str], &str); 25] = [
         (&["drop.out", "-o", "a.jpg"], ".jpg is none of .png .gif .apng .mp4 .webm"),
         (&["drop.out", "-o", "a.png"], "`a.png` is one picture, and there are 6 frames"),
         (&["drop.out", "-o", "a.gif", "--fps", "60"], "50 is the most"),
