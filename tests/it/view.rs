@@ -256,7 +256,7 @@ fn what_cannot_be_viewed_is_said() {
     for (arguments, words) in [
         (&["view", "drop.rfm", "--save", "a.html"][..], "rfm run drop.rfm"),
         (&["view", "empty", "--save", "a.html"], "there are no frames in `empty`"),
-        (&["view", "none.rfm", "--no-open"], "cannot read `none.rfm`"),
+        (&["view", "none.rfm", "--no-open"], "there is no file `none.rfm`"),
         (&["view", "-"], "standard input cannot be viewed"),
         (&["view", "drop.rfm", "--host", "256.1.1.1", "--no-open"], "cannot serve at --host 256.1.1.1"),
         (&["view", "drop.rfm", "--scene", "drip", "--no-open"], "no scene `drip`; did you mean `drop`?"),

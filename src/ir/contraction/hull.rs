@@ -44,7 +44,12 @@ impl Contractor {
                         let Some(found) = found else { return Contracted::Somewhere };
                         forms::collect(self, &self.forms, scratch, found);
                         if self.is_quadric
-                            && let Some(around) = ellipsoid(self, &scratch.values, wanted.negated)
+                            && let Some(around) = ellipsoid(
+                                (&self.rules, &self.degrees),
+                                self.root(),
+                                &scratch.values,
+                                wanted.negated,
+                            )
                         {
                             *space = space.intersection(&around);
                         }

@@ -5,7 +5,6 @@
 
 use glam::{DMat3, DVec3};
 
-use super::contractor::Contractor;
 use super::rule::{Degree, Rule};
 use crate::geom::{Aabb, eigen};
 use crate::interval::Interval;
@@ -81,13 +80,18 @@ pub fn is_quadric(rules: &[Rule], root: Node) -> bool {
     degrees(&rules[..=root.index()])[root.index()] == 2
 }
 
-/// A box around the points where the root is positive, or negative; `None` where it is no ellipsoid. `values` are those
-/// of the numbers among the nodes.
-pub fn ellipsoid(contractor: &Contractor, values: &[Interval], negated: bool) -> Option<Aabb> {
-    let root = contractor.root().index();
+/// A box around the points where the root of some rules is positive, or negative; `None` where it is no ellipsoid. `values`
+/// are those of the numbers among the nodes.
+pub fn ellipsoid(
+    (rules, degrees): (&[Rule], &[Degree]),
+    root: Node,
+    values: &[Interval],
+    negated: bool,
+) -> Option<Aabb> {
+    let root = root.index();
     let mut forms: Vec<Option<Form>> = Vec::with_capacity(root + 1);
-    for (i, rule) in contractor.rules[..=root].iter().enumerate() {
-        let form = match contractor.degrees[i] {
+    for (i, rule) in rules[..=root].iter().enumerate() {
+        let form = match degrees[i] {
             Degree::Number => number(values[i]),
             Degree::Linear | Degree::Other => form(rule, &forms, values),
         };
@@ -226,7 +230,7 @@ fn around(form: &Form, sign: f64, rounding: f64) -> Option<Aabb> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::ir::{Binary, Contracted, Graph, Region, Wanted};
+    use crate::ir::{Binary, Contracted, Contractor, Graph, Region, Wanted};
 
     /// The box of 1 − x² − y² − z² + a·x·y + b·y·z + c·x, as the contraction finds it.
     fn found([a, b, c]: [f64; 3]) -> Aabb {
