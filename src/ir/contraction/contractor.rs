@@ -250,6 +250,12 @@ impl Contractor {
         Some(())
     }
 
+    /// Without boxes around ellipsoids. What is added to a formula must not depend on whether its params are numbers or
+    /// arguments, of which there is no matrix.
+    pub(super) fn without_ellipsoids(self) -> Self {
+        Self { is_quadric: false, ..self }
+    }
+
     pub(super) fn root(&self) -> Node {
         self.root
     }

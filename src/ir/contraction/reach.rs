@@ -244,7 +244,7 @@ impl<'g> Junctions<'g> {
             let by = graph.constant(if negated { -depth } else { depth });
             root = graph.binary(Binary::Add, root, by);
         }
-        let contractor = Contractor::new(&graph, root);
+        let contractor = Contractor::new(&graph, root).without_ellipsoids();
         let mut given: Vec<LinearForm> = Vec::new();
         for _ in 0..ROUNDS {
             if space.is_empty() {
