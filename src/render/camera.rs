@@ -16,8 +16,8 @@ pub(super) const SUBPIXELS: usize = 2;
 /// nearly parallel.
 const DISTANCE: f64 = 3.0;
 
-/// The same where lines are parallel. It does not change what is seen; the larger it is, the more even the nearness, and
-/// the less of it a single precision tells apart.
+/// That distance where lines are parallel. What is seen does not depend on it, only how even the nearness is (more so with a
+/// larger one) and how finely single precision resolves it (with a smaller one).
 const PARALLEL_DISTANCE: f64 = 12.0;
 
 /// The margins around the box in a picture 960 high: left, top, right (colour bar), bottom (caption).

@@ -132,7 +132,7 @@ const WORK_OF_TURNS: usize = MOST_WORK / 5;
 /// The part of its length to which a ray is halved around the surface.
 const FINE: f64 = 1e-12;
 
-/// The same while rays are turned, over the angle of the turn.
+/// That part while rays are turned, over the angle of the turn: they need only be compared.
 const FINE_OF_TURN: f64 = 1e-6;
 
 /// Halvings of a ray around the surface.

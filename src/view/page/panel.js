@@ -154,7 +154,7 @@ function showParams(params) {
   }
 }
 
-/** The looks of single obstacles, where there are several of them, and not so many that nobody would look for one. */
+/** The looks of single obstacles: of several, but not of so many that nobody would look for one, unless one has a look already. */
 function bodiesGroup(viewer) {
   const { look, setting: { bodies } } = viewer;
   const isShort = bodies.length > 1 && bodies.length <= 40;
