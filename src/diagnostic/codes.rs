@@ -305,6 +305,12 @@ Where the angle of a place is meant, it is `atan2(y, x)` about the z axis. In a 
 
     rfm 1
     solid wedge = x <= 10 deg and box()                      # atan2(y, x) <= 10 deg";
+LOFT_OF_SOLIDS = "W0426":
+"`a.loft(b, z0, z1)` leads from the outline a at z0 to the outline b at z1. Outlines are fields of x and y, which go on along z
+without an end. Of a solid it takes the field at each height as it is, so that most often what comes out is neither shape.
+
+    rfm 1
+    solid a = sphere(1).loft(sphere(2), 0, 1)                # sphere(1).at([x, y, 0]).loft(sphere(2).at([x, y, 0]), 0, 1)";
 FLUID_IN_OBSTACLE = "W0501":
 "Part of the fluid's shape lies inside an obstacle, or outside the box or the container. Those particles are carved off before the
 run starts. `rfm run` counts them. `rfm check` and editors estimate by samples how much of the shape is taken, and tell of it where
@@ -412,6 +418,16 @@ force on the fluid. `walls: no_slip`, or that of an obstacle, changes nothing th
 PICTURE_ASIDE = "W0525":
 "`look_at` in the block `picture` is the place in the middle of the pictures, in metres. It lies outside of the box, where nothing
 is drawn, so pictures may be empty. Left out, it is the middle of the box; `zoom` makes what is there larger.";
+HEAVY_FLUID = "W0526":
+"No liquid is as dense: water has 998 kg/m³, mercury 13 546, molten metals up to 20 000. A factor of a thousand too much is most
+often one of units: a bare number is in kg/m³, and 1 g/cm³ are 1000 of them. Forces, pressures and loads grow with it.";
+CROWDED = "W0527":
+"Sums over neighbours are made for particles that stand about a spacing apart in all directions. A fluid that is pressed flat, or
+drawn out, in less time than its particles need to mix keeps the rows that it began with: close to each other one way, and far
+the other way. The sums then take it for denser than it is, and pressures and forces are too large; neither its volume nor its
+compression shows that. A layer of ten spacings that two plates pressed to four felt three times the force, and to three had
+2.9 times the energy that it should have. Finer particles, a jitter and shifting hardly help; a slower motion does, in which
+particles have the time to change places.";
 OBSTACLE_FILLS_BOX = "E0502":
 "The obstacle covers every place where fluid was to be put: nothing is left to simulate.";
 }

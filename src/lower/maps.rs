@@ -37,8 +37,21 @@ impl Lowering<'_> {
         self.least_with_round(field, p, bounds.centre().to_array(), radius, span)
     }
 
-    /// The second of two outlines, between which a loft leads: they must not lie beside each other.
+    /// The second of two outlines, between which a loft leads: they must not lie beside each other. Solids in their
+    /// place are asked about.
     pub fn overlapping(&mut self, a: Node, b: Node, span: Span) -> Node {
+        if [a, b].into_iter().any(|shape| self.module.graph.uses(shape, Axis::Z)) {
+            // an outline that turns or narrows along z has no end there
+            if [a, b].into_iter().any(|shape| ir::reach(&self.module.graph, shape).is_some()) {
+                let message =
+                    "a loft leads from outline to outline, and here is a solid that ends along z by itself";
+                self.report(
+                    Diagnostic::warning(Code::LOFT_OF_SOLIDS, self.user_span(span), message)
+                        .help("the outline of a solid at the height 0 is `.at([x, y, 0])` of it"),
+                );
+            }
+            return b;
+        }
         let [x, y, z] = Axis::SPACE.map(|axis| self.module.graph.coordinate(axis));
         let [zero, one] = [0.0, 1.0].map(|number| self.constant(number));
         let rest = self.binary(Binary::Sub, one, z, span);

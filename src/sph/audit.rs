@@ -22,9 +22,11 @@ use glam::DVec3;
 use rayon::prelude::*;
 
 mod compression;
+mod crowding;
 mod memory;
 
 pub use compression::Compression;
+use crowding::Crowding;
 
 use super::core::Core;
 use super::error::StepError;
@@ -134,13 +136,14 @@ pub struct Audit {
     /// The change of the volume that is largest by its amount.
     volume_change: f64,
     compression: Compression,
+    crowding: Crowding,
     max_speed: f64,
     /// The greatest part of the particles that was faster than [`MOST_MACH`] at once.
     too_fast: f64,
     /// The figures of the last look.
     now: Instant,
     /// Which findings have been reported, in the order of [`Finding::ALL`].
-    told: [bool; 4],
+    told: [bool; 5],
 }
 
 /// The figures of one look.
@@ -163,10 +166,12 @@ pub enum Finding {
     Compression,
     /// The fluid is as fast as a gas, for its speed of sound.
     Speed,
+    /// Particles came closer to each other than sums over neighbours are made for.
+    Crowding,
 }
 
 impl Finding {
-    const ALL: [Self; 4] = [Self::Energy, Self::Volume, Self::Compression, Self::Speed];
+    const ALL: [Self; 5] = [Self::Energy, Self::Volume, Self::Compression, Self::Speed, Self::Crowding];
 }
 
 /// A sum over all particles at one instant.
@@ -277,10 +282,11 @@ impl Audit {
             volume_at_start: volume,
             volume_change: 0.0,
             compression,
+            crowding: Crowding::start(core),
             max_speed: sums.fastest,
             too_fast: sums.too_fast as f64 / n,
             now: Instant { compression, speed: sums.fastest, ..Instant::default() },
-            told: [false; 4],
+            told: [false; 5],
         }
     }
 
@@ -359,6 +365,7 @@ impl Audit {
                 self.volume_change = change;
             }
         }
+        self.crowding.look(core);
         Ok(())
     }
 
@@ -485,7 +492,7 @@ impl Audit {
         });
         Finding::ALL
             .into_iter()
-            .zip([energy, volume, compression, self.gas(parameters)])
+            .zip([energy, volume, compression, self.gas(parameters), self.crowding.finding()])
             .filter_map(|(f, t)| Some((f, t?)))
             .collect()
     }

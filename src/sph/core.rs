@@ -464,10 +464,10 @@ impl Core {
     }
 }
 
-/// Counts the neighbours within the radius.
+/// Counts the neighbours within the radius, m, which is at most the support radius.
 #[derive(Clone, Copy)]
-struct Count {
-    radius: f64,
+pub(super) struct Count {
+    pub radius: f64,
 }
 
 impl PairPass<0, 1, 1> for Count {

@@ -277,9 +277,11 @@ impl<'t> Slip<'t> {
             let line = value.lines().next().unwrap_or_default();
             let value = first_part(line);
             let value = if value.is_empty() || !fits(&[value]) { "…" } else { value };
-            return Some(
-                self.syntax("a key and its value are joined by `:`").help(format!("write `{key}: {value}`")),
-            );
+            let (message, written) = match key {
+                "obstacle" | "container" => ("a block has no `=`", format!("{key} {{ solid: {value} }}")),
+                _ => ("a key and its value are joined by `:`", format!("{key}: {value}")),
+            };
+            return Some(self.syntax(message).help(format!("write `{written}`")));
         }
         if before.ends_with([':', '+', '-', '*', '/', '^']) {
             return Some(self.unexpected().help("a definition is written `let a = 1`, and never changed"));

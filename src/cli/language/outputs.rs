@@ -116,7 +116,11 @@ const SUMMARY: [Entry; 44] = [
     ("compression_p99", "part of ρ₀", "the largest value that one particle in a hundred exceeds"),
     ("compression_max", "part of ρ₀", "the largest value of a particle"),
     ("max_speed", "m/s", "the greatest speed of a particle after any step"),
-    ("findings", "", "the codes of what the audit found, of W0511 to W0513 and W0520: `rfm explain W0511`"),
+    (
+        "findings",
+        "",
+        "the codes of what the audit found, of W0511 to W0513, W0520 and W0527: `rfm explain W0511`",
+    ),
     (
         "pressure_error",
         "part of the truth",

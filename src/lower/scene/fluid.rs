@@ -5,11 +5,15 @@ use super::super::lowering::Lowering;
 use super::declaration::{SceneKey, declare_keys, names as key_names};
 use super::{Block, Fluid, Solver};
 use crate::diagnostic::{Code, Diagnostic, Span};
+use crate::geom::significant;
 use crate::ir::{Axis, Node};
 use crate::precision::Precision;
 use crate::quantity::{Bound, Dimension};
 use crate::sph::{Fill, KeyBlock, KeyReader, Method};
 use crate::syntax::ast::Entry;
+
+/// A fluid denser than this, kg/m³, is asked about: molten osmium has 20 000.
+const MOST_DENSITY: f64 = 25_000.0;
 
 /// What a fluid has at the start and not later, and what is said where it depends on the time.
 pub(super) struct Start {
@@ -245,6 +249,15 @@ impl<'a> Lowering<'a> {
     /// Reads density, mass and support radius of the particles. A spacing may replace the mass.
     fn resolution(&mut self, block: &Block<'_>) -> Option<Resolution> {
         let density = self.number_key(block, &keys::DENSITY);
+        if let (Some(density), Some((_, value))) = (density, block.setting(keys::DENSITY.name))
+            && density > MOST_DENSITY
+        {
+            let message = format!("a fluid of {} kg/m³ is denser than any liquid", significant(density));
+            self.report(
+                Diagnostic::warning(Code::HEAVY_FLUID, value.span, message)
+                    .help("water has 998 kg/m³, mercury 13 546: is the unit the one that is meant? `1 g/cm^3` is 1000 kg/m³"),
+            );
+        }
         let mass = self.number_key(block, &keys::MASS);
         let spacing = self.stated_number(block, &keys::SPACING);
         let both = (block.setting(keys::MASS.name), block.setting(keys::SPACING.name));

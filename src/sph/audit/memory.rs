@@ -2,7 +2,7 @@
 
 use glam::DVec3;
 
-use super::{Audit, Compression, Instant};
+use super::{Audit, Compression, Crowding, Instant};
 
 impl Audit {
     /// The audit as numbers, for a checkpoint.
@@ -30,6 +30,8 @@ impl Audit {
             largest,
             self.max_speed,
             self.too_fast,
+            self.crowding.at_start,
+            self.crowding.most,
             self.liveliest,
             self.given,
             self.supplied,
@@ -65,6 +67,8 @@ impl Audit {
                 largest,
                 max_speed,
                 too_fast,
+                crowded_at_start,
+                crowded,
                 liveliest,
                 given,
                 supplied,
@@ -78,7 +82,7 @@ impl Audit {
                 speed,
                 told @ ..,
             ],
-        ) = <[f64; 34]>::try_from(memory)
+        ) = <[f64; 37]>::try_from(memory)
         else {
             return;
         };
@@ -104,6 +108,7 @@ impl Audit {
             volume_at_start,
             volume_change,
             compression: Compression { mean, p99, largest },
+            crowding: Crowding { at_start: crowded_at_start, most: crowded },
             max_speed,
             too_fast,
             now: Instant {

@@ -98,6 +98,32 @@ fn a_fluid_as_fast_as_a_gas_is_told_of() {
     assert!(told.is_some_and(|text| text.contains("a derived speed of sound of 4 m/s")), "{found:?}");
 }
 
+/// A cube of 0.4 m without gravity that is pressed flat along x at this rate, 1/s, and grows in y and z as much.
+fn pressed_flat(method: Method, rate: f64) -> Simulation {
+    let spacing = 0.05;
+    let mut fluid = crate::sph::Particles::default();
+    for place in (0..512).map(|i| DVec3::new((i % 8) as f64, (i / 8 % 8) as f64, (i / 64) as f64) - 3.5) {
+        fluid.push(spacing * place, rate * spacing * place * DVec3::new(-1.0, 0.5, 0.5));
+    }
+    let parameters = Parameters { gravity: DVec3::ZERO, ..parameters(method, spacing) };
+    let room = Aabb::new(DVec3::splat(-1.0), DVec3::splat(1.0));
+    Simulation::new(parameters, fluid, room, Vec::new()).unwrap()
+}
+
+#[test]
+fn rows_that_are_pressed_together_are_told_of() {
+    for method in [Method::from(Wcsph::default()), Dfsph::default().into()] {
+        let told = |rate: f64, until: f64| {
+            let mut simulation = pressed_flat(method, rate);
+            simulation.advance(until, |_| std::ops::ControlFlow::Continue(())).unwrap();
+            simulation.findings().into_iter().any(|(finding, _)| finding == Finding::Crowding)
+        };
+        // a layer of the thickness h becomes thinner at the rate −s·h/(1 + s·t): to 0.4 and to 0.8 of what it was
+        assert!(told(10.0, 0.15), "{method:?}");
+        assert!(!told(10.0, 0.025), "{method:?}");
+    }
+}
+
 #[test]
 fn energy_from_nowhere_is_found_and_stops_a_run() {
     let mut simulation = column(Wcsph::default().into(), 0.1);

@@ -32,7 +32,7 @@ impl Slip<'_> {
                 .or_else(|| self.argument_behind_a_colon()),
             "-" => self.name_with_a_dash(),
             "." => self.box_as_a_range().or_else(|| self.fold_of_three()),
-            "}" => self.block_without_a_key(),
+            "}" => self.block_without_a_key().or_else(|| self.block_without_braces()),
             found if found.starts_with(|c: char| c.is_ascii_digit()) => self.vector_without_commas(),
             _ => None,
         }
