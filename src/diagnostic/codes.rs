@@ -307,7 +307,8 @@ Where the angle of a place is meant, it is `atan2(y, x)` about the z axis. In a 
     solid wedge = x <= 10 deg and box()                      # atan2(y, x) <= 10 deg";
 LOFT_OF_SOLIDS = "W0426":
 "`a.loft(b, z0, z1)` leads from the outline a at z0 to the outline b at z1. Outlines are fields of x and y, which go on along z
-without an end. Of a solid it takes the field at each height as it is, so that most often what comes out is neither shape.
+without an end. Of a solid it takes the values at each height, which also tell of its ends, so that what comes out is most often
+smaller than what was meant. It is right if the solid reaches far below z0 and far above z1.
 
     rfm 1
     solid a = sphere(1).loft(sphere(2), 0, 1)                # sphere(1).at([x, y, 0]).loft(sphere(2).at([x, y, 0]), 0, 1)";
@@ -419,15 +420,16 @@ PICTURE_ASIDE = "W0525":
 "`look_at` in the block `picture` is the place in the middle of the pictures, in metres. It lies outside of the box, where nothing
 is drawn, so pictures may be empty. Left out, it is the middle of the box; `zoom` makes what is there larger.";
 HEAVY_FLUID = "W0526":
-"No liquid is as dense: water has 998 kg/m³, mercury 13 546, molten metals up to 20 000. A factor of a thousand too much is most
-often one of units: a bare number is in kg/m³, and 1 g/cm³ are 1000 of them. Forces, pressures and loads grow with it.";
+"No liquid is so dense: water has 998 kg/m³, mercury 13 546, and molten metals have up to 20 000. Most often another unit was meant:
+a bare number is in kg/m³, so water is `1000` or `1 g/cm^3`. Forces, pressures and loads grow with the density.";
 CROWDED = "W0527":
 "Sums over neighbours are made for particles that stand about a spacing apart in all directions. A fluid that is pressed flat, or
 drawn out, in less time than its particles need to mix keeps the rows that it began with: close to each other one way, and far
-the other way. The sums then take it for denser than it is, and pressures and forces are too large; neither its volume nor its
-compression shows that. A layer of ten spacings that two plates pressed to four felt three times the force, and to three had
-2.9 times the energy that it should have. Finer particles, a jitter and shifting hardly help; a slower motion does, in which
-particles have the time to change places.";
+the other way. The sums then say a greater density than there is, and the pressure grows until the rows stand so far apart that the
+sums are right: volume and compression, which are found by the same sums, show nothing, but pressures and forces are too large.
+Plates that pressed a layer of ten spacings to four within 6 ms bore three times the force; pressed to three, the layer had 2.9 times
+the energy that it should have. There finer particles, a jitter and shifting hardly help; a slower motion does, in which particles
+have the time to change places. For a fluid that is drawn out slowly `shifting: 1` helps, and with `wcsph` `gradients: differences`.";
 OBSTACLE_FILLS_BOX = "E0502":
 "The obstacle covers every place where fluid was to be put: nothing is left to simulate.";
 }

@@ -40,18 +40,6 @@ impl Lowering<'_> {
     /// The second of two outlines, between which a loft leads: they must not lie beside each other. Solids in their
     /// place are asked about.
     pub fn overlapping(&mut self, a: Node, b: Node, span: Span) -> Node {
-        if [a, b].into_iter().any(|shape| self.module.graph.uses(shape, Axis::Z)) {
-            // an outline that turns or narrows along z has no end there
-            if [a, b].into_iter().any(|shape| ir::reach(&self.module.graph, shape).is_some()) {
-                let message =
-                    "a loft leads from outline to outline, and here is a solid that ends along z by itself";
-                self.report(
-                    Diagnostic::warning(Code::LOFT_OF_SOLIDS, self.user_span(span), message)
-                        .help("the outline of a solid at the height 0 is `.at([x, y, 0])` of it"),
-                );
-            }
-            return b;
-        }
         let [x, y, z] = Axis::SPACE.map(|axis| self.module.graph.coordinate(axis));
         let [zero, one] = [0.0, 1.0].map(|number| self.constant(number));
         let rest = self.binary(Binary::Sub, one, z, span);
@@ -67,8 +55,21 @@ impl Lowering<'_> {
             let message = "the outlines of a loft lie beside each other, and a loft holds only what lies between overlapping ones";
             let help = "move one over the other with `.move`; a tube from place to place is `sweep([[0, 0, 0], [3, 0, 1]], 0.1)`";
             self.report(Diagnostic::error(Code::OUTLINE, self.user_span(span), message).help(help));
+        } else if [a, b].into_iter().any(|shape| self.ends_along_z(shape)) {
+            let message =
+                "a loft leads from outline to outline, and here is a solid that ends along z by itself";
+            self.report(
+                Diagnostic::warning(Code::LOFT_OF_SOLIDS, self.user_span(span), message)
+                    .help("the outline of a solid at the height 0 is `.at([x, y, 0])` of it"),
+            );
         }
         b
+    }
+
+    /// Whether a shape has proven ends along z. An outline that turns or narrows along z has none.
+    fn ends_along_z(&self, shape: Node) -> bool {
+        let graph = &self.module.graph;
+        graph.uses(shape, Axis::Z) && ir::reach(graph, shape).is_some()
     }
 
     /// The least of a field and that of a disc or ball, which is a tenth larger than asked for, so that the surface is

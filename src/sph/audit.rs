@@ -1,5 +1,5 @@
-//! The audit of a simulation: what its energy, its volume and its densities say about whether it can be
-//! believed. It runs in every simulation and changes nothing in it.
+//! The audit of a simulation: what its energy, its volume, its densities, its speed and the distances of its particles
+//! say about whether it can be believed. It runs in every simulation and changes nothing in it.
 //!
 //! Energy is compared with the work of gravity and of walls after every step: E = ½Σmv² + Σm·e(ρ) − W. The
 //! work of uniform gravity is M·g·Δ(centre of mass), and that of a field of gravity is the integral of its
@@ -22,11 +22,11 @@ use glam::DVec3;
 use rayon::prelude::*;
 
 mod compression;
-mod crowding;
 mod memory;
+mod rows;
 
 pub use compression::Compression;
-use crowding::Crowding;
+use rows::Rows;
 
 use super::core::Core;
 use super::error::StepError;
@@ -136,7 +136,7 @@ pub struct Audit {
     /// The change of the volume that is largest by its amount.
     volume_change: f64,
     compression: Compression,
-    crowding: Crowding,
+    rows: Rows,
     max_speed: f64,
     /// The greatest part of the particles that was faster than [`MOST_MACH`] at once.
     too_fast: f64,
@@ -167,11 +167,11 @@ pub enum Finding {
     /// The fluid is as fast as a gas, for its speed of sound.
     Speed,
     /// Particles came closer to each other than sums over neighbours are made for.
-    Crowding,
+    Rows,
 }
 
 impl Finding {
-    const ALL: [Self; 5] = [Self::Energy, Self::Volume, Self::Compression, Self::Speed, Self::Crowding];
+    const ALL: [Self; 5] = [Self::Energy, Self::Volume, Self::Compression, Self::Speed, Self::Rows];
 }
 
 /// A sum over all particles at one instant.
@@ -282,7 +282,7 @@ impl Audit {
             volume_at_start: volume,
             volume_change: 0.0,
             compression,
-            crowding: Crowding::start(core),
+            rows: Rows::start(core),
             max_speed: sums.fastest,
             too_fast: sums.too_fast as f64 / n,
             now: Instant { compression, speed: sums.fastest, ..Instant::default() },
@@ -365,7 +365,7 @@ impl Audit {
                 self.volume_change = change;
             }
         }
-        self.crowding.look(core);
+        self.rows.look(core);
         Ok(())
     }
 
@@ -492,7 +492,7 @@ impl Audit {
         });
         Finding::ALL
             .into_iter()
-            .zip([energy, volume, compression, self.gas(parameters), self.crowding.finding()])
+            .zip([energy, volume, compression, self.gas(parameters), self.rows.finding()])
             .filter_map(|(f, t)| Some((f, t?)))
             .collect()
     }

@@ -187,7 +187,7 @@ impl Simulation {
         self.audit.speed()
     }
 
-    /// What the energy, the volume and the densities of this simulation have shown since its start.
+    /// What the energy, the volume, the densities, the speed and the rows of this simulation have shown since its start.
     pub fn audit(&self) -> &Audit {
         &self.audit
     }

@@ -277,8 +277,9 @@ impl<'t> Slip<'t> {
             let line = value.lines().next().unwrap_or_default();
             let value = first_part(line);
             let value = if value.is_empty() || !fits(&[value]) { "…" } else { value };
+            let solid = if value.starts_with('"') { &format!("mesh({value})") } else { value };
             let (message, written) = match key {
-                "obstacle" | "container" => ("a block has no `=`", format!("{key} {{ solid: {value} }}")),
+                "obstacle" | "container" => ("a block has no `=`", format!("{key} {{ solid: {solid} }}")),
                 _ => ("a key and its value are joined by `:`", format!("{key}: {value}")),
             };
             return Some(self.syntax(message).help(format!("write `{written}`")));

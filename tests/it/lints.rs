@@ -435,6 +435,29 @@ fn equal_operands_are_told_of_where_a_person_has_written_them() {
     }
 }
 
+#[test]
+fn only_lofts_of_solids_are_asked_about() {
+    let told = |first: &str| {
+        let text = format!(
+            "rfm 1\nlet square = polygon([[0, 0], [1, 0], [1, 1], [0, 1]]) solid s = {first}.loft(square, 0, 1)"
+        );
+        let program = Program::from_source("t.rfm", text).unwrap_or_else(|e| panic!("{first}: {e}"));
+        program.warnings().list.iter().any(|warning| warning.code.0 == "W0426")
+    };
+    for outline in [
+        "square",
+        "square.twist(0.1)",
+        "square.taper(1, 0.5)",
+        "text(\"R\", 1)",
+        "(x^2 + y^2 <= 1 + 0.1*sin(z))",
+    ] {
+        assert!(!told(outline), "{outline}");
+    }
+    for solid in ["sphere(1)", "square.extrude(0, 1)", "box([0, 0, 0.2], [1, 1, 0.8])"] {
+        assert!(told(solid), "{solid}");
+    }
+}
+
 /// What is left of a cone is a point up to rounding, which no grid divides. The other solids of the file are measured.
 #[test]
 fn a_solid_that_is_next_to_nothing_does_not_hide_the_others() {

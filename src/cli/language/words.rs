@@ -130,7 +130,11 @@ const FUNCTIONS: &[(&str, &str, &str)] = &[
         "a line of letters that begins at the origin, as a profile: `text(\"R\", 1).extrude(0, 0.2)`",
     ),
     ("around", "e, outer", "the smaller one of e and the field of a ball around `outer`"),
-    ("overlapping", "a, b", "b, or an error where the outlines a and b lie beside each other"),
+    (
+        "overlapping",
+        "a, b",
+        "b; an error where the outlines a and b lie beside each other, a question where one is a solid",
+    ),
     ("slope", "e", "the length of the gradient, |∇ω|"),
     ("normalise", "e", "ω/√(ω² + |∇ω|²)"),
     ("normalize", "e", "ω/√(ω² + |∇ω|²)"),

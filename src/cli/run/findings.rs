@@ -13,7 +13,7 @@ pub(super) fn code(finding: Finding) -> Code {
         Finding::Volume => Code::VOLUME_CHANGED,
         Finding::Compression => Code::COMPRESSED,
         Finding::Speed => Code::SLOW_SOUND,
-        Finding::Crowding => Code::CROWDED,
+        Finding::Rows => Code::CROWDED,
     }
 }
 

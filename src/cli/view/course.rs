@@ -222,7 +222,7 @@ impl Flow {
     fn details(&self, spent: f64) -> String {
         let speed = if spent > 0.0 { format!(" · {:.1} ms per step", 1e3 * spent) } else { String::new() };
         let found = self.simulation.findings();
-        let found = found.last().map_or_else(String::new, |(_, message)| format!(" · {message}"));
+        let found: String = found.iter().map(|(_, message)| format!(" · {message}")).collect();
         let until = self.experiment.scene().run.until;
         let past = if self.simulation.time() > until {
             format!(" · past the end of the run, {until} s")

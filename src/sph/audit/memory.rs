@@ -2,7 +2,7 @@
 
 use glam::DVec3;
 
-use super::{Audit, Compression, Crowding, Instant};
+use super::{Audit, Compression, Instant, Rows};
 
 impl Audit {
     /// The audit as numbers, for a checkpoint.
@@ -30,8 +30,8 @@ impl Audit {
             largest,
             self.max_speed,
             self.too_fast,
-            self.crowding.at_start,
-            self.crowding.most,
+            self.rows.at_start,
+            self.rows.most,
             self.liveliest,
             self.given,
             self.supplied,
@@ -108,7 +108,7 @@ impl Audit {
             volume_at_start,
             volume_change,
             compression: Compression { mean, p99, largest },
-            crowding: Crowding { at_start: crowded_at_start, most: crowded },
+            rows: Rows { at_start: crowded_at_start, most: crowded },
             max_speed,
             too_fast,
             now: Instant {

@@ -51,6 +51,7 @@ const SCENES: &[&str] = &[
     "obstacle { solid: pots }",
     "obstacle: post",
     "obstacle = post",
+    "obstacle = \"post.stl\"",
     "fluid: water",
     "method: sph",
     "method: pcisph",
