@@ -161,3 +161,10 @@ fn a_force_on_a_shape_without_a_name() {
     assert!(found.contains("write `force: obstacle`, or `solid: post` in place"), "{found}");
     assert!(!found.contains("define `solid post"), "{found}");
 }
+
+/// A file is no solid, but a shape can be made of it.
+#[test]
+fn an_obstacle_that_is_a_file() {
+    let found = messages("scene s {\n  box { max: [1, 1, 1] }\n  obstacle = \"post.stl\"\n}").to_string();
+    assert!(found.contains("write `obstacle { solid: mesh(\"post.stl\") }`"), "{found}");
+}

@@ -51,7 +51,6 @@ const SCENES: &[&str] = &[
     "obstacle { solid: pots }",
     "obstacle: post",
     "obstacle = post",
-    "obstacle = \"post.stl\"",
     "fluid: water",
     "method: sph",
     "method: pcisph",
