@@ -218,7 +218,9 @@ impl Experiment {
         let mut particles = std::mem::take(&mut filling.particles);
         self.set_in_motion(&mut particles);
         let filling::Filling { carved, mass, fills_vessel, .. } = filling;
-        let parameters = Parameters { particle_mass: mass, fills_vessel, ..self.parameters.clone() };
+        let is_sealed = fills_vessel && self.keeps_its_room();
+        let parameters =
+            Parameters { particle_mass: mass, fills_vessel, is_sealed, ..self.parameters.clone() };
         let field = match &self.scene.gravity {
             Gravity::Field(nodes) => Some(vector_field(&self.program, nodes)),
             Gravity::Still(_) | Gravity::Turning(_) => None,

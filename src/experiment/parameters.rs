@@ -69,6 +69,7 @@ pub(super) fn of_scene(program: &Program, scene: &Scene, mass: f64, typical_spee
             .any(|s| s.slip == Slip::No),
         // known once the particles are placed
         fills_vessel: false,
+        is_sealed: false,
         packing: 1.0,
         precision: scene.solver.precision.unwrap_or(method.precision),
     }

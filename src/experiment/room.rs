@@ -2,7 +2,7 @@
 
 use glam::DVec3;
 
-use super::{Body, Experiment, refuse};
+use super::{Body, Experiment, free_surface, refuse};
 use crate::Solid;
 use crate::compile::Error;
 use crate::diagnostic::{Code, Diagnostic, Span};
@@ -349,7 +349,7 @@ impl Experiment {
     pub fn lacks_room(&self, fluid: &Aabb, time: f64, needed: f64) -> Option<f64> {
         let bodies: Vec<_> = self.bodies.iter().map(|body| body.solid.at(time)).collect();
         let within = self.around(fluid);
-        if sampled(&bodies, &within) >= needed {
+        if sampled(&bodies, &within, |_| true) >= needed {
             return None;
         }
         Some(free_of(&bodies, within)).filter(|free| *free < needed)
@@ -359,7 +359,17 @@ impl Experiment {
     /// box, nor farther away, as behind a neck.
     pub(super) fn has_no_more_room(&self, fluid: &Aabb, than: f64) -> bool {
         let bodies: Vec<_> = self.bodies.iter().map(|body| body.solid.clone()).collect();
-        free_of(&bodies, self.around(fluid)) < than && sampled(&bodies, &self.scene.domain) < than
+        let around = self.around(fluid);
+        let near = free_of(&bodies, around);
+        near < than && near + sampled(&bodies, &self.scene.domain, |at| !around.contains(at)) < than
+    }
+
+    /// Whether no body that moves will leave more or less room to a fluid that has none to spare, as far as samples show.
+    pub(super) fn keeps_its_room(&self) -> bool {
+        let bodies = || self.bodies.iter().map(|body| &body.solid);
+        let spacing = self.parameters.spacing();
+        bodies().all(|body| !body.moves())
+            || !free_surface::has_surface(&self.scene, &self.fluid, bodies(), spacing)
     }
 
     /// The part of the box that lies so near to a fluid within some bounds that it shows whether the fluid has room.
@@ -492,13 +502,13 @@ fn free_of(bodies: &[Solid], within: Aabb) -> f64 {
     Region { shape: &Everywhere, bodies, within }.volume()
 }
 
-/// [`free_of`], found by samples.
-fn sampled(bodies: &[Solid], within: &Aabb) -> f64 {
+/// [`free_of`], found by samples, of those places that count.
+fn sampled(bodies: &[Solid], within: &Aabb, counts: impl Fn(DVec3) -> bool) -> f64 {
     let crowd = Crowd::of(bodies.iter());
     let (mut free, mut all) = (0.0, 0.0);
     for at in samples(within) {
         all += 1.0;
-        free += f64::from(u8::from(crowd.is_free(at)));
+        free += f64::from(u8::from(counts(at) && crowd.is_free(at)));
     }
     within.volume() * free / all
 }

@@ -312,6 +312,8 @@ impl Audit {
         let by_gravity = by_fall + 0.5 * dt * (before + power);
         // the part of it that the velocities do not show yet
         let to_come = match (is_staggered, self.is_moved) {
+            // in a sealed vessel walls bear the weight in the same step
+            (true, true) if parameters.is_sealed => 0.5 * dt * power,
             // the work of walls is that up to the middle of the step, and what they carry has moved to its end
             (true, true) => 0.5 * (by_fall + dt * power),
             (true, false) => 0.5 * dt * power,
@@ -422,6 +424,11 @@ impl Audit {
     /// The worst compression by the places of the particles. Each figure is the worst of its own instant.
     pub fn compression(&self) -> Compression {
         self.compression
+    }
+
+    /// The greatest part of the particles, beyond that at the start, that were closer to another one than half a spacing.
+    pub fn crowded(&self) -> f64 {
+        self.rows.most - self.rows.at_start
     }
 
     /// The greatest speed of a particle after any step, m/s.

@@ -249,7 +249,7 @@ impl Core {
 
     /// Whether any gravity pulls at the fluid.
     pub fn has_weight(&self) -> bool {
-        self.gravity_field.is_some() || self.parameters.gravity != DVec3::ZERO
+        self.gravity_field.is_some() || self.parameters.pull() != DVec3::ZERO
     }
 
     /// Adds to the accelerations a part of the gravity that depends on the place, if there is any.

@@ -61,6 +61,9 @@ pub struct Parameters {
     /// Whether the fluid fills all room that the box and the obstacles leave, so that it has no surface.
     /// `dfsph` then packs the particles at the start, and finds their `packing`.
     pub fills_vessel: bool,
+    /// Whether it always will. Uniform gravity then moves nothing in it, and `dfsph` adds the hydrostatic pressure that
+    /// it causes to the pressures of the motion.
+    pub is_sealed: bool,
     /// Part of the room of a fluid that fills its vessel which the volumes of its particles take in sums over
     /// neighbours: particles that have left their lattice leave gaps. One for any other fluid. A simulation
     /// finds it.
@@ -113,6 +116,7 @@ impl Parameters {
             sticks: false,
             wall_friction: 0.0,
             fills_vessel: false,
+            is_sealed: false,
             packing: 1.0,
             precision: fluid.precision,
         };
@@ -188,6 +192,11 @@ impl Parameters {
             expected_speed: self.expected_speed,
             sticks: self.sticks || self.slip == Slip::No,
         }
+    }
+
+    /// The uniform gravity that sets the fluid in motion, m/s².
+    pub fn pull(&self) -> DVec3 {
+        if self.is_sealed { DVec3::ZERO } else { self.gravity }
     }
 
     /// Distance between particles at rest, (m/ρ₀)^⅓, m.

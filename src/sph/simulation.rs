@@ -48,6 +48,8 @@ const MASS: &str = "particle mass";
 
 /// Name of the packing in a checkpoint.
 const PACKING: &str = "packing";
+/// Name of what says whether a full vessel will stay full.
+const SEALED: &str = "sealed";
 
 /// Name of whether the fluid fills its vessel, 1 or 0, in a checkpoint.
 const FILLS_VESSEL: &str = "fills its vessel";
@@ -121,6 +123,9 @@ impl Simulation {
         if let Ok([fills_vessel]) = checkpoint.get(FILLS_VESSEL) {
             parameters.fills_vessel = *fills_vessel != 0.0;
         }
+        if let Ok([is_sealed]) = checkpoint.get(SEALED) {
+            parameters.is_sealed = *is_sealed != 0.0;
+        }
         let particles = checkpoint.particles().map_err(SetupError::Checkpoint)?;
         // the particles of a checkpoint are sorted already: sorting them again leaves their order
         let instant = Some((checkpoint.steps, checkpoint.time));
@@ -141,6 +146,7 @@ impl Simulation {
         checkpoint.set(MASS, vec![self.core.parameters.particle_mass]);
         checkpoint.set(PACKING, vec![self.core.parameters.packing]);
         checkpoint.set(FILLS_VESSEL, vec![f64::from(u8::from(self.core.parameters.fills_vessel))]);
+        checkpoint.set(SEALED, vec![f64::from(u8::from(self.core.parameters.is_sealed))]);
         checkpoint
     }
 

@@ -4,6 +4,7 @@
 //! name and computes no number. Every node carries its span.
 
 pub mod ast;
+mod block_form;
 mod brackets;
 mod build;
 mod code;
@@ -17,6 +18,7 @@ mod tokens;
 mod words;
 
 pub use ast::Ast;
+pub use block_form::block_form;
 pub use format::{Spelling, format};
 pub use grammar::EDITION;
 pub use parse::parse;

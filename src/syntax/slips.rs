@@ -3,11 +3,17 @@
 
 mod heads;
 mod openscad;
+mod pieces;
 mod ranges;
 mod units;
 
+use self::pieces::{
+    bracketed, closing, first_part, fits, is_condition, last_number, last_number_or_word, last_part,
+    last_word, number_ends, parts, token_end, unclosed, words,
+};
+use super::block_form::block_form;
 use super::foreign;
-use super::words::{ITEM_WORDS, KEYWORDS, token_at};
+use super::words::{ITEM_WORDS, KEYWORDS};
 use crate::diagnostic::{Code, Diagnostic, Span, nearest};
 
 /// A place in the text where the grammar went no further.
@@ -69,6 +75,12 @@ impl<'t> Slip<'t> {
     fn in_braces(&self) -> bool {
         let opened = self.before().matches('{').count();
         opened > self.before().matches('}').count()
+    }
+
+    /// Whether what stands before defines this name as a shape.
+    fn defines(&self, name: &str) -> bool {
+        let all: Vec<&str> = self.text[..self.at].split_whitespace().collect();
+        all.windows(2).any(|pair| matches!(pair[0], "solid" | "let") && pair[1].trim_end_matches('=') == name)
     }
 
     /// A word where none may stand.
@@ -278,9 +290,9 @@ impl<'t> Slip<'t> {
             let value = first_part(line);
             let value = if value.is_empty() || !fits(&[value]) { "…" } else { value };
             let solid = if value.starts_with('"') { &format!("mesh({value})") } else { value };
-            let (message, written) = match key {
-                "obstacle" | "container" => ("a block has no `=`", format!("{key} {{ solid: {solid} }}")),
-                _ => ("a key and its value are joined by `:`", format!("{key}: {value}")),
+            let (message, written) = match block_form(key, solid, self.defines(value)) {
+                Some(block) => ("a block has no `=`", block),
+                None => ("a key and its value are joined by `:`", format!("{key}: {value}")),
             };
             return Some(self.syntax(message).help(format!("write `{written}`")));
         }
@@ -443,157 +455,4 @@ impl<'t> Slip<'t> {
 /// Whether a path is that of a mesh, by its ending.
 fn is_a_mesh(path: &str) -> bool {
     [".stl", ".obj", ".ply"].iter().any(|ending| path.to_lowercase().ends_with(ending))
-}
-
-/// Whether the text ends in a number rather than in a name such as `r2`.
-fn number_ends(text: &str) -> bool {
-    let start = text
-        .rfind(|c: char| !(c.is_alphanumeric() || c == '_' || c == '.'))
-        .map_or(0, |at| at + text[at..].chars().next().map_or(1, char::len_utf8));
-    text[start..].starts_with(|c: char| c.is_ascii_digit() || c == '.')
-}
-
-fn last_number(text: &str) -> &str {
-    &text[text.trim_end_matches(|c: char| c.is_ascii_digit() || c == '.').len()..]
-}
-
-/// The words of a text, the last one first.
-fn words(text: &str) -> impl Iterator<Item = &str> {
-    text.split(|c: char| !c.is_alphanumeric() && c != '_').rev()
-}
-
-/// Whether a text ends within the condition of an `if`. A line with a comment or a text in it is not looked at.
-fn is_condition(text: &str) -> bool {
-    let line = text.rfind('\n').map_or(text, |end| &text[end..]);
-    let last = words(line).find(|word| ["if", "then"].contains(word));
-    !line.contains(['#', '"']) && last == Some("if")
-}
-
-fn last_word(text: &str) -> &str {
-    &text[text.trim_end_matches(|c: char| c.is_alphanumeric() || c == '_').len()..]
-}
-
-fn last_number_or_word(text: &str) -> &str {
-    last_word(text.trim_end())
-}
-
-/// Where the number or word ends that a text begins with, white space before it included.
-fn token_end(text: &str) -> usize {
-    let blank = text.len() - text.trim_start().len();
-    blank + token_at(text, blank, text.len()).len()
-}
-
-/// The first value of a line: up to a comma or a bracket that closes what was open before.
-fn first_part(line: &str) -> &str {
-    let mut depth = 0_i32;
-    for (at, c) in line.char_indices() {
-        match c {
-            '(' | '[' | '{' => depth += 1,
-            ')' | ']' | '}' if depth == 0 => return line[..at].trim(),
-            ')' | ']' | '}' => depth -= 1,
-            ',' | ';' | '#' if depth == 0 => return line[..at].trim(),
-            _ => {}
-        }
-    }
-    line.trim()
-}
-
-/// The bracket that a text opens last without closing it, if it is a round one.
-fn unclosed(text: &str) -> Option<usize> {
-    let mut open = Vec::new();
-    for (at, c) in text.char_indices() {
-        match c {
-            '(' | '[' | '{' => open.push((at, c)),
-            ')' | ']' | '}' => drop(open.pop()),
-            _ => {}
-        }
-    }
-    open.last().filter(|(_, bracket)| *bracket == '(').map(|(at, _)| *at)
-}
-
-/// Where the round bracket ends that was open before a text.
-fn closing(text: &str) -> Option<usize> {
-    let mut depth = 0;
-    text.char_indices().find_map(|(at, c)| {
-        match c {
-            '(' | '[' | '{' => depth += 1,
-            ')' if depth == 0 => return Some(at),
-            ')' | ']' | '}' => depth -= 1,
-            _ => {}
-        }
-        None
-    })
-}
-
-/// The last operand of a text: what stands behind a bracket that is still open, a sign or a word that joins.
-fn last_part(text: &str) -> &str {
-    // where the operand begins, and those around it
-    let (mut start, mut around) = (0, Vec::new());
-    for (at, c) in text.char_indices() {
-        match c {
-            '(' | '[' => {
-                around.push(start);
-                start = at + c.len_utf8();
-            }
-            ')' | ']' => start = around.pop().unwrap_or(start),
-            '=' | ':' | ',' | '&' | '|' | '\\' | '<' | '>' | '∧' | '∨' | '≤' | '≥' => {
-                start = at + c.len_utf8()
-            }
-            _ => {}
-        }
-        if [" and ", " or ", " not "].iter().any(|word| text[..at].ends_with(word)) {
-            start = at;
-        }
-    }
-    text[start..].trim()
-}
-
-/// The text between a bracket at the beginning and the one that closes it.
-fn bracketed(text: &str) -> Option<&str> {
-    let inner = text.strip_prefix('(')?;
-    let mut depth = 0_i32;
-    for (at, c) in inner.char_indices() {
-        match c {
-            '(' | '[' => depth += 1,
-            ')' if depth == 0 => return Some(&inner[..at]),
-            ')' | ']' => depth -= 1,
-            _ => {}
-        }
-    }
-    None
-}
-
-/// Where the bracket opens that closes at the end of a text.
-fn opening(text: &str) -> Option<usize> {
-    let mut depth = 0_i32;
-    for (at, c) in text.char_indices().rev() {
-        match c {
-            ')' => depth += 1,
-            '(' => depth -= 1,
-            _ => {}
-        }
-        if depth == 0 {
-            return Some(at);
-        }
-    }
-    None
-}
-
-/// The parts of a list of arguments.
-fn parts(arguments: &str) -> Vec<&str> {
-    let mut rest = arguments;
-    let mut parts = Vec::new();
-    while !rest.trim().is_empty() {
-        let part = first_part(rest);
-        parts.push(part);
-        let end = rest.find(part).map_or(rest.len(), |at| at + part.len());
-        rest = rest[end..].trim_start().get(1..).unwrap_or_default();
-    }
-    parts
-}
-
-/// Whether what the user wrote is short enough to be repeated in a message.
-fn fits(parts: &[&str]) -> bool {
-    let length: usize = parts.iter().map(|part| part.len()).sum();
-    length <= 100 && parts.iter().all(|part| !part.is_empty() && !part.contains(['\n', '`', '\u{1b}']))
 }

@@ -70,6 +70,8 @@ pub(super) struct Summary {
     compression_p99: f64,
     /// The largest compression of a particle.
     compression_max: f64,
+    /// The greatest part of the particles, beyond that at the start, that were closer to another one than half a spacing.
+    crowded: f64,
     /// The greatest speed after any step, m/s.
     max_speed: f64,
     /// The codes of what the audit of the run has found.
@@ -144,6 +146,7 @@ impl Summary {
             compression_mean: compression.mean,
             compression_p99: compression.p99,
             compression_max: compression.largest,
+            crowded: audit.crowded(),
             max_speed: audit.max_speed(),
             findings: simulation
                 .findings()

@@ -73,11 +73,12 @@ impl Command {
 }
 
 /// What judges a run.
-const RUN: [&str; 8] = [
+const RUN: [&str; 9] = [
     "energy_excess",
     "volume_change",
     "compression_mean",
     "compression_p99",
+    "crowded",
     "max_speed",
     "pressure_error",
     "velocity_error",

@@ -3,6 +3,7 @@
 use glam::DVec3;
 
 use super::super::lowering::Lowering;
+use super::super::names::Kind;
 use super::super::value::Value;
 use super::declaration::{KeyValue, SceneKey, names};
 use crate::diagnostic::{Code, Diagnostic, Span};
@@ -10,7 +11,7 @@ use crate::ir::Node;
 use crate::quantity::{Bound, Dimension, parse_unit};
 use crate::sph::{KeyBlock, Method};
 use crate::syntax::ast::{Entry, Expr, ExprKind, Name};
-use crate::syntax::foreign;
+use crate::syntax::{block_form, foreign};
 
 /// What there is to say to a kinematic viscosity.
 const DYNAMIC: &str =
@@ -178,6 +179,19 @@ impl<'a> Lowering<'a> {
         self.report(Diagnostic::error(Code::SCENE_MISSING, block.span, message).help(help));
     }
 
+    /// How a block is written whose key was given a value.
+    fn block_form(&self, key: &str, value: &Expr) -> String {
+        let is_shape = match &value.kind {
+            ExprKind::Name(name) => self
+                .names
+                .of(value.span.source, name)
+                .is_some_and(|global| matches!(global.kind, Kind::Solid(_) | Kind::Value(_))),
+            _ => false,
+        };
+        block_form(key, self.written(value).unwrap_or("…"), is_shape)
+            .unwrap_or_else(|| format!("{key} {{ … }}"))
+    }
+
     /// Makes a [`Block`], and reports unknown keys and known ones that stand twice without being
     /// `repeatable`.
     pub(in crate::lower) fn block<'b>(
@@ -245,7 +259,7 @@ impl<'a> Lowering<'a> {
             } else if matches!(entry, Entry::Block { .. }) != opens_block(&key.text) {
                 let (is, form) = match entry {
                     Entry::Block { .. } => ("has a value", format!("{}: …", key.text)),
-                    Entry::Setting { value, .. } => ("is a block", block_form(&key.text, value)),
+                    Entry::Setting { value, .. } => ("is a block", self.block_form(&key.text, value)),
                 };
                 let message = format!("`{}` {is}", key.text);
                 self.report(
@@ -526,21 +540,6 @@ impl<'a> Lowering<'a> {
                 self.as_constant(node, expr.span, &format!("`{key}`"))
             }
         }
-    }
-}
-
-/// How a block is written.
-fn block_form(key: &str, value: &Expr) -> String {
-    if let ("obstacle" | "container", ExprKind::Name(solid)) = (key, &value.kind) {
-        return format!("{key} {{ solid: {solid} }}");
-    }
-    match key {
-        "flux" => "flux { point: [0.5, 0.5, 0.5], normal: [1, 0, 0] }".into(),
-        "box" => "box { min: [0, 0, 0], max: [1, 1, 1] }".into(),
-        "run" => "run { until: 2 s }".into(),
-        "fluid" => "fluid water { shape: ball([0.5, 0.5, 0.5], 0.2), particles: 10000 }".into(),
-        "picture" => "picture { camera: [0, -1, 0.3], cut: y <= 0 }".into(),
-        key => format!("{key} {{ … }}"),
     }
 }
 

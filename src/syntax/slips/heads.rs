@@ -2,7 +2,8 @@
 
 use super::super::foreign;
 use super::super::words::ITEM_WORDS;
-use super::{Slip, bracketed, fits, last_number, last_word, parts, unclosed};
+use super::Slip;
+use super::pieces::{bracketed, fits, last_number, last_word, parts, unclosed};
 use crate::diagnostic::{Code, Diagnostic, Span};
 
 /// What begins a fold.

@@ -1,8 +1,9 @@
 //! Slips in ranges: of params, of folds, and of what lies between two bounds.
 
 use super::super::foreign;
+use super::Slip;
 use super::heads::FOLDS;
-use super::{Slip, bracketed, first_part, fits, last_part, last_word, parts, words};
+use super::pieces::{bracketed, first_part, fits, last_part, last_word, parts, words};
 use crate::diagnostic::Diagnostic;
 
 impl Slip<'_> {

@@ -1,7 +1,8 @@
 //! Slips in units: behind formulas, of other systems, and in other spellings.
 
 use super::super::foreign;
-use super::{Slip, fits, last_part, last_word, number_ends, token_end, words};
+use super::Slip;
+use super::pieces::{fits, last_part, last_word, number_ends, token_end, words};
 use crate::diagnostic::{Code, Diagnostic, Span, nearest};
 use crate::quantity::parse_unit;
 

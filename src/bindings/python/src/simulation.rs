@@ -391,6 +391,7 @@ impl PySimulation {
             compression.mean,
             compression.p99,
             compression.largest,
+            audit.crowded(),
             audit.max_speed(),
             PyTuple::new(py, findings)?,
         ))

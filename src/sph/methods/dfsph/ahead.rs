@@ -64,7 +64,7 @@ impl Ahead {
             add_scaled(&mut core.acceleration, tension, part);
         }
         // steps differ in length, and half of this one waits
-        let uniform = core.parameters.gravity;
+        let uniform = core.parameters.pull();
         let pulled = core.acceleration.components().into_iter().zip(self.held.components_mut());
         for ((now, before), uniform) in pulled.zip(uniform.to_array()) {
             before.iter_mut().zip(now).for_each(|(before, now)| *before = (now - *before) / part + uniform);
@@ -91,8 +91,8 @@ impl Ahead {
     fn add_held(&self, core: &mut Core, time: f64) {
         if !self.held.x.is_empty() {
             add_scaled(&mut core.particles.velocity, &self.held, time);
-        } else if core.parameters.gravity != DVec3::ZERO {
-            let change = time * core.parameters.gravity;
+        } else if core.parameters.pull() != DVec3::ZERO {
+            let change = time * core.parameters.pull();
             let columns = core.particles.velocity.components_mut().into_iter();
             for (column, change) in columns.zip(change.to_array()) {
                 column.iter_mut().for_each(|v| *v += change);

@@ -3,6 +3,7 @@
 mod ahead;
 mod arrest;
 mod full;
+mod hydrostatic;
 mod mirrored;
 mod passes;
 mod rigid;

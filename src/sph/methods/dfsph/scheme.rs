@@ -85,6 +85,7 @@ use super::super::{
 };
 use super::ahead::Ahead;
 use super::arrest::Arrest;
+use super::hydrostatic::Hydrostatic;
 use super::passes::{Constants, Continuation, Densities, Drag};
 use super::rigid::Rigid;
 use super::solver::{Begin, Errors, Goal, RateOf, Solver};
@@ -362,7 +363,7 @@ impl DivergenceFree {
     /// Finds the accelerations by gravity, viscosity and surface tension.
     fn find_other_accelerations(&mut self, core: &mut Core, dt: f64) {
         let mut acceleration = std::mem::take(&mut core.acceleration);
-        let g = core.parameters.gravity;
+        let g = core.parameters.pull();
         let Vectors { x, y, z } = &mut acceleration;
         let parameters = &core.parameters;
         let artificial = roughness::factor(
@@ -423,9 +424,11 @@ impl DivergenceFree {
         // the compression without pressure; each iteration finds how much of it s takes away
         self.forces.find_rate_of(core, &self.walls, &core.particles.velocity, RateOf::Velocity(&self.whole));
         let found = (&self.forces.rate[..], &self.loaded[..], &self.debt[..]);
+        let mut hydrostatic = None;
         if core.parameters.fills_vessel {
             // particles that have a wall of a spacing between them belong to two bodies
             let bodies = bodies(core, core.parameters.spacing());
+            hydrostatic = core.parameters.is_sealed.then(|| Hydrostatic::of(core, &bodies));
             full::find_unwanted(&mut self.free, &bodies, found, relaxation);
             // a mean over neighbours changes those of the bodies
             full::smooth(core, &self.walls, &mut self.free, &mut self.field);
@@ -451,6 +454,9 @@ impl DivergenceFree {
         self.iterations = self.forces.solve(core, &self.walls, &self.free, dt, goal, Begin::Last);
         if let Some(reaction) = Reaction::of(core, dt) {
             self.forces.note_walls(reaction, &self.walls, rest, (&self.forces.push, &self.forces.s));
+            if let Some(hydrostatic) = &hydrostatic {
+                hydrostatic.note_walls(core, (&self.forces, &self.walls), reaction);
+            }
         }
         for ((free, rate), debt) in self.free.iter().zip(&self.forces.rate).zip(&mut self.debt) {
             let left = free + dt * rate;
@@ -465,7 +471,7 @@ impl DivergenceFree {
             self.ahead.give(core, (&self.forces, &self.walls), dt);
         }
         add_scaled(&mut core.acceleration, &self.ahead.push, 0.5);
-        self.report_pressure(core, dt, relaxation);
+        self.report_pressure(core, dt, relaxation, hydrostatic.as_ref());
     }
 
     /// Finds the displacements of a step of the length dt: those by shifting, and those that keep densities
@@ -524,7 +530,7 @@ fn relaxation_time(parameters: &Parameters, speed: f64, dt: f64) -> f64 {
     // where nothing is expected to move, only frames limit the steps
     let allowed = parameters.time_step.min(parameters.stable_dt(speed));
     let most = MOST_RELAXATION_STEPS * allowed;
-    let gravity = parameters.gravity.length().max(parameters.most_gravity);
+    let gravity = parameters.pull().length().max(parameters.most_gravity);
     let fall = (parameters.support_radius / gravity).sqrt();
     let falls = if fall.is_finite() { (RELAXATION_FALLS * fall).min(most) } else { 0.0 };
     let moving = RELAXATION_STEPS * dt;

@@ -4,6 +4,7 @@ mod at_edges;
 mod linear;
 mod numbers;
 mod passes;
+mod rates;
 mod scheme;
 
 use super::declaration::{Absence, Declaration, FluidDefaults, Key, KeyBlock, Support, Value};

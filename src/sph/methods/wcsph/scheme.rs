@@ -80,7 +80,8 @@ use super::super::{
 };
 use super::at_edges::Edges;
 use super::numbers::{Numbers, at_rest, sums_crowding, tait};
-use super::passes::{Differences, Missing, Pairs, Rates, Shifted, closes_gaps};
+use super::passes::{Differences, Missing, Pairs, Shifted};
+use super::rates::{Rates, closes_gaps};
 use super::{EXPONENT, Gradients, Wcsph};
 use crate::sph::{
     checkpoint::{Checkpoint, CheckpointError},

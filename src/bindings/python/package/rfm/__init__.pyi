@@ -72,6 +72,7 @@ class Audit(NamedTuple):
     compression_mean: float
     compression_p99: float
     compression_max: float
+    crowded: float
     max_speed: float
     findings: tuple[str, ...]
 

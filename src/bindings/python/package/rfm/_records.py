@@ -50,6 +50,7 @@ Audit = namedtuple(
         "compression_mean",
         "compression_p99",
         "compression_max",
+        "crowded",
         "max_speed",
         "findings",
     ],
@@ -59,7 +60,8 @@ Audit.__doc__ = """What a simulation has shown since its start; the worst figure
 
 ``energy_excess`` is None if the energy is not judged; ``unjudged`` then says why. ``wall_work`` is the
 work of walls that move on the fluid, in J, None if the energy is not judged; with ``gradients:
-differences`` it is known to a tenth. ``findings`` are sentences about what a user must know.
+differences`` it is known to a tenth. ``crowded`` is the part of the particles, beyond that at the start, that
+were closer to another one than half a spacing. ``findings`` are sentences about what a user must know.
 """
 
 Stats = namedtuple(

@@ -1,6 +1,7 @@
 //! The pressures of a step: those that particles bear, and those around them that are reported.
 
 use super::super::super::shifting::depth;
+use super::super::hydrostatic::Hydrostatic;
 use super::super::passes::{Constants, Field};
 use super::DivergenceFree;
 use crate::sph::{
@@ -47,8 +48,14 @@ impl DivergenceFree {
     }
 
     /// Finds the pressures around the particles, and averages the reported ones over at most the time in which a
-    /// particle moves by a spacing. Packed particles are heavier than they count in the sums, and so is their weight.
-    pub(super) fn report_pressure(&mut self, core: &mut Core, dt: f64, relaxation: f64) {
+    /// particle moves by a spacing, with the hydrostatic one of a full vessel. Packed particles are heavier than they count in the sums, and so is their weight.
+    pub(super) fn report_pressure(
+        &mut self,
+        core: &mut Core,
+        dt: f64,
+        relaxation: f64,
+        hydrostatic: Option<&Hydrostatic>,
+    ) {
         let Constants { kernel, rest_density, .. } = Constants::of(&core.parameters);
         // the field of the sums, which is divided by the packing below
         let rest_density = core.parameters.packing * rest_density;
@@ -65,7 +72,8 @@ impl DivergenceFree {
         for (i, (mean, now)) in pressure.iter_mut().zip(&self.field).enumerate() {
             let speed = (velocity.get(i) - self.whole.at(position.get(i))).length();
             // the pressure that a particle bore a spacing ago belongs to another place
-            *mean += share.max((dt * speed / spacing).min(1.0)) * (now / packing - *mean);
+            let still = hydrostatic.map_or(0.0, |hydrostatic| hydrostatic.pressure[i]);
+            *mean += share.max((dt * speed / spacing).min(1.0)) * (now / packing + still - *mean);
         }
     }
 }
