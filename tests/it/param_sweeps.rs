@@ -72,7 +72,7 @@ fn several_sweeps_make_a_grid_with_units() {
     let text = "rfm 1\nparam a = 10 mm\nparam alpha = 0 deg in 0 deg .. 90 deg\n\
                 solid s = box([0, 0, 0], [a, 1, 1]).rotate_z(alpha)\n";
     let folder = in_folder(text);
-    let arguments = ["mesh", "a.rfm", "--cells", "24", "-o", "parts/a.stl", "--into", "out", "--json"];
+    let arguments = ["mesh", "a.rfm", "--cells", "24", "-o", "a.stl", "--into", "out", "--json"];
     let sweeps = ["--sweep", "a=1..3 m:2", "--sweep", "alpha=0..45 deg:4"];
     let printed = rfm(folder.path(), &[&arguments[..], &sweeps[..]].concat()).expect(0).json();
     let found = index(&folder.path().join("out"));
@@ -83,7 +83,7 @@ fn several_sweeps_make_a_grid_with_units() {
         let a = row["values"][0].as_f64().unwrap();
         assert!((figure(row, "volume") / a - 1.0).abs() < 1e-3, "{row}");
         assert_eq!(figure(row, "closed"), 1.0);
-        let part = folder.path().join("out").join(row["folder"].as_str().unwrap()).join("parts/a.stl");
+        let part = folder.path().join("out").join(row["folder"].as_str().unwrap()).join("a.stl");
         assert!(part.is_file());
     }
     // a line for each of the four angles
@@ -92,21 +92,31 @@ fn several_sweeps_make_a_grid_with_units() {
 }
 
 #[test]
-fn a_path_that_leads_out_of_the_sweep_is_followed() {
+fn a_folder_in_the_name_of_a_file_is_refused() {
     let folder = in_folder(BALL);
     let elsewhere = tempfile::tempdir().unwrap();
-    std::fs::create_dir(folder.path().join("work")).unwrap();
     let absolute = elsewhere.path().join("ball.stl").to_string_lossy().into_owned();
-    let is_there = |path: &Path| assert!(path.is_file(), "{}", path.display());
-    for (path, parent) in
-        [(&*absolute, elsewhere.path()), ("../meshes/ball.stl", &folder.path().join("meshes"))]
-    {
-        let sweep = ["--sweep", "r=1,2", "--into", "swept", "--force"];
-        let arguments = [&["mesh", "../a.rfm", "--cells", "16", "-o", path][..], &sweep].concat();
-        rfm(&folder.path().join("work"), &arguments).expect(0);
-        ["r=1", "r=2"].into_iter().for_each(|of| is_there(&parent.join(of).join("ball.stl")));
+    let to_absolute = format!("write --into {} -o ball.stl", elsewhere.path().display());
+    let sweep = ["a.rfm", "--sweep", "r=1,2"];
+    for (arguments, advice) in [
+        (&["mesh", "-o", &absolute][..], &*to_absolute),
+        (&["mesh", "-o", "../meshes/ball.stl"], "write --into ../meshes -o ball.stl"),
+        (&["mesh", "-o", "parts/ball.stl"], "write --into parts -o ball.stl"),
+        (&["mesh", "-o", "parts/ball.stl", "--into", "out"], "write -o ball.stl"),
+        (&["mesh", "-o", ".."], "write the name of a file, and the folder of the sweep by --into DIR"),
+        (&["check", "--slice", "z=0", "-o", "p/s.svg"], "write --into p -o s.svg"),
+        (&["report", "--html", "p/a.html"], "write --into p --html a.html"),
+    ] {
+        let refused = rfm(folder.path(), &[arguments, &sweep].concat()).expect(2);
+        assert!(refused.stderr.contains(advice), "{arguments:?}: {}", refused.stderr);
+        assert!(refused.stderr.contains("names a file in each folder of the sweep"), "{}", refused.stderr);
     }
-    is_there(&folder.path().join("work/swept/index.json"));
+    // nothing was made, here or there
+    assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 1);
+    assert_eq!(std::fs::read_dir(elsewhere.path()).unwrap().count(), 0);
+    let arguments = ["mesh", "--cells", "16", "-o", "./ball.stl"];
+    rfm(folder.path(), &[&arguments[..], &sweep].concat()).expect(0);
+    assert!(folder.path().join("a.sweep/r=2/ball.stl").is_file());
 }
 
 #[test]

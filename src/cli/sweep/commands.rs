@@ -3,6 +3,7 @@
 use std::path::{Component, Path, PathBuf};
 
 use super::super::args::{Check, Mesh, MessageFormat, Run};
+use super::super::output::Shown;
 use super::super::report::Report;
 use super::super::shared::Shared;
 use super::super::{Failure, check as checks, choose, input, mesh as meshes, report as reports, run as runs};
@@ -24,20 +25,33 @@ fn task<'a>(
     Task { shared, command, file, sweeps: &sweep.sweep, folder, options, resume, force }
 }
 
-/// The path that was asked for within the folder of a combination; folders that it needs are made. A path that leads
-/// elsewhere is followed, and its file stands there in a folder with the name of the combination.
-fn made_within(folder: &Path, asked: Option<&PathBuf>) -> Option<PathBuf> {
-    let is_below = |part: Component<'_>| matches!(part, Component::Normal(_) | Component::CurDir);
-    asked.map(|path| {
-        let path =
-            match (path.components().all(is_below), path.parent(), path.file_name(), folder.file_name()) {
-                (false, Some(parent), Some(file), Some(combination)) => parent.join(combination).join(file),
-                _ => folder.join(path),
-            };
-        // if there can be no such folder, the message about the file says why
-        let _ = path.parent().map(std::fs::create_dir_all);
-        path
-    })
+/// Refuses a path with a folder where a sweep takes the name of a file, which it writes in each of its folders. Only
+/// `--into` names the folder of a sweep: what it holds is in the index, and guarded by `--force` and `--resume`.
+fn plain_name(flag: &str, asked: Option<&PathBuf>, sweep: &SweepOptions) -> Result<(), Failure> {
+    let Some(path) = asked else { return Ok(()) };
+    let mut parts = path.components().filter(|part| *part != Component::CurDir);
+    let is_plain = matches!(parts.next(), Some(Component::Normal(_))) && parts.next().is_none();
+    if is_plain {
+        return Ok(());
+    }
+    let shown = path.shown();
+    let message =
+        format!("{flag} names a file in each folder of the sweep, and `{shown}` names a folder as well");
+    let name = path.file_name().map(|name| Path::new(name).shown());
+    let folder = path.parent().map(Path::shown).filter(|folder| !folder.is_empty());
+    let advice = match (name, folder) {
+        (Some(name), Some(folder)) if sweep.into.is_none() => {
+            format!("the folder of the sweep is given by --into DIR: write --into {folder} {flag} {name}")
+        }
+        (Some(name), _) => format!("the folder of the sweep is given by --into DIR: write {flag} {name}"),
+        (None, _) => "write the name of a file, and the folder of the sweep by --into DIR".into(),
+    };
+    Err(Failure::usage(format!("{message}; {advice}")))
+}
+
+/// The file of a plain name in the folder of a combination.
+fn within(folder: &Path, asked: Option<&PathBuf>) -> Option<PathBuf> {
+    asked.map(|name| folder.join(name))
 }
 
 /// Whether a path stands for standard output, on which a sweep prints its table.
@@ -63,6 +77,7 @@ pub(in crate::cli) fn check(shared: &Shared, options: &Check) -> Result<(), Fail
         ("--message-format", form),
         ("-o -", to_stdout),
     ])?;
+    plain_name("-o", options.output.as_ref(), &options.sweep)?;
     let [file] = &options.files[..] else {
         return Err(Failure::usage("--sweep goes through the values of one file at a time"));
     };
@@ -71,7 +86,7 @@ pub(in crate::cli) fn check(shared: &Shared, options: &Check) -> Result<(), Fail
     task(shared, Command::Check, file, &options.sweep, again, format!("{single:?}")).go(|shared, folder| {
         let slice = PathBuf::from("slice.svg");
         let wanted = (!options.slice.is_empty()).then(|| options.output.as_ref().unwrap_or(&slice));
-        let output = wanted.and_then(|output| made_within(folder, Some(output)));
+        let output = wanted.and_then(|output| within(folder, Some(output)));
         checks::run(shared, &Check { output, ..single.clone() })
     })
 }
@@ -79,11 +94,12 @@ pub(in crate::cli) fn check(shared: &Shared, options: &Check) -> Result<(), Fail
 /// `rfm mesh --sweep`.
 pub(in crate::cli) fn mesh(shared: &Shared, options: &Mesh) -> Result<(), Failure> {
     refuse(&[("-o -", is_stdout(options.output.as_deref()))])?;
+    plain_name("-o", options.output.as_ref(), &options.sweep)?;
     let single = Mesh { sweep: SweepOptions::default(), again: Default::default(), ..options.clone() };
     let again = [options.again.resume, options.again.force];
     task(shared, Command::Mesh, &options.file, &options.sweep, again, format!("{single:?}")).go(
         |shared, folder| {
-            let output = made_within(folder, options.output.as_ref());
+            let output = within(folder, options.output.as_ref());
             meshes::run(shared, &Mesh { output, ..single.clone() })
         },
     )
@@ -115,6 +131,11 @@ pub(in crate::cli) fn report(shared: &Shared, options: &Report) -> Result<(), Fa
     let [output, mesh_plot, html] =
         [&options.output, &options.mesh_plot, &options.html].map(|path| is_stdout(path.as_deref()));
     refuse(&[("-o -", output), ("--mesh-plot -", mesh_plot), ("--html -", html)])?;
+    for (flag, path) in
+        [("-o", &options.output), ("--mesh-plot", &options.mesh_plot), ("--html", &options.html)]
+    {
+        plain_name(flag, path.as_ref(), &options.sweep)?;
+    }
     let (file, name) = choose::subject(&options.subject);
     let is_size = options.sweep.sweep.iter().any(|sweep| sweep.name == "particles");
     // standard input is read once, and no sweep reads it
@@ -127,8 +148,8 @@ pub(in crate::cli) fn report(shared: &Shared, options: &Report) -> Result<(), Fa
     let single = Report { sweep: SweepOptions::default(), again: Default::default(), ..options.clone() };
     let again = [options.again.resume, options.again.force];
     task(shared, Command::Report, file, &options.sweep, again, format!("{single:?}")).go(|shared, folder| {
-        let [output, mesh_plot, html] = [&options.output, &options.mesh_plot, &options.html]
-            .map(|path| made_within(folder, path.as_ref()));
+        let [output, mesh_plot, html] =
+            [&options.output, &options.mesh_plot, &options.html].map(|path| within(folder, path.as_ref()));
         reports::run(shared, &Report { output, mesh_plot, html, ..single.clone() })
     })
 }
