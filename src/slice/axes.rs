@@ -18,6 +18,10 @@ const MIN_SIDE: f64 = 60.0;
 const TICK: f64 = 5.0;
 /// The width of a digit of a number at a tick.
 const LETTER: f64 = 6.6;
+/// The height of the capitals in the name of an axis, and the room that is left outside of it.
+const NAME: f64 = 12.0;
+/// From the plotted area to the numbers of the vertical axis, and from these to the name of the axis.
+const BESIDE_NUMBERS: f64 = TICK + 14.0;
 /// Room for one label on the horizontal and on the vertical axis.
 const LABEL_SPACING: DVec2 = DVec2::new(46.0, 36.0);
 
@@ -37,6 +41,19 @@ impl PlotFrame {
         Self { window, origin, size: (size * scale).max(DVec2::splat(MIN_SIDE)).round() }
     }
 
+    /// [`PlotFrame::new`], moved to the right as far as the numbers of the vertical axis and its name need room.
+    pub fn with_room(window: Window, least: DVec2) -> Self {
+        let frame = Self::new(window, least);
+        let needed = (NAME + BESIDE_NUMBERS + LETTER * widest(&written(&frame.ticks(1))) as f64).ceil();
+        Self { origin: DVec2::new(least.x.max(needed), least.y), ..frame }
+    }
+
+    /// The numbers of an axis: 0 is the horizontal one, 1 the vertical one.
+    fn ticks(&self, axis: usize) -> Vec<Decimal> {
+        let count = ((self.size[axis] / LABEL_SPACING[axis]) as usize).clamp(2, 9);
+        at_least_two(self.window.min[axis], self.window.max[axis], count)
+    }
+
     pub fn page(&self, uv: DVec2) -> DVec2 {
         let t = (uv - self.window.min) / self.window.size();
         self.origin + self.size * DVec2::new(t.x, 1.0 - t.y)
@@ -54,17 +71,15 @@ impl PlotFrame {
 /// Draws the border, ticks with numbers, and the names of the axes.
 pub fn draw(out: &mut String, frame: &PlotFrame, plane: Plane) {
     let (right, up) = plane.axis.right_and_up();
-    let PlotFrame { window, origin, size } = *frame;
+    let PlotFrame { origin, size, .. } = *frame;
     let (left, bottom) = (origin.x, frame.bottom());
-    let count = |axis: usize| ((size[axis] / LABEL_SPACING[axis]) as usize).clamp(2, 9);
 
     let mut marks = String::new();
     let mut numbers = String::new();
-    let across = at_least_two(window.min.x, window.max.x, count(0));
+    let across = frame.ticks(0);
     let texts = written(&across);
     // numbers that would run into each other make room for the first and the last
-    let widest = texts.iter().map(|text| text.chars().count()).max().unwrap_or(1);
-    let room = size.x / across.len().max(1) as f64 >= LETTER * widest as f64 + 6.0;
+    let room = size.x / across.len().max(1) as f64 >= LETTER * widest(&texts) as f64 + 6.0;
     for (k, (tick, label)) in across.iter().zip(&texts).enumerate() {
         let x = frame.page(DVec2::new(tick.value(), 0.0)).x;
         let _ = write!(marks, "M{x:.2} {bottom}v{TICK}");
@@ -72,11 +87,10 @@ pub fn draw(out: &mut String, frame: &PlotFrame, plane: Plane) {
             let _ = writeln!(numbers, r#"<text x="{x:.2}" y="{:.2}">{label}</text>"#, bottom + TICK + 13.0);
         }
     }
-    let mut widest = 1;
-    let upwards = at_least_two(window.min.y, window.max.y, count(1));
-    for (tick, label) in upwards.iter().zip(written(&upwards)) {
+    let upwards = frame.ticks(1);
+    let texts = written(&upwards);
+    for (tick, label) in upwards.iter().zip(&texts) {
         let y = frame.page(DVec2::new(0.0, tick.value())).y;
-        widest = widest.max(label.chars().count());
         let _ = write!(marks, "M{left} {y:.2}h-{TICK}");
         let _ = writeln!(
             numbers,
@@ -102,12 +116,17 @@ pub fn draw(out: &mut String, frame: &PlotFrame, plane: Plane) {
         r#"<text x="{x:.2}" y="{y:.2}" font-size="14" text-anchor="middle">{}, m</text>"#,
         right.name()
     );
-    let (x, y) = (left - TICK - 14.0 - LETTER * widest as f64, origin.y + 0.5 * size.y + 4.0);
+    let (x, y) = (left - BESIDE_NUMBERS - LETTER * widest(&texts) as f64, origin.y + 0.5 * size.y + 4.0);
     let _ = writeln!(
         out,
         r#"<text transform="translate({x:.2} {y:.2}) rotate(-90)" font-size="14" text-anchor="middle">{}, m</text>"#,
         up.name()
     );
+}
+
+/// The number of characters of the longest text.
+fn widest(texts: &[String]) -> usize {
+    texts.iter().map(|text| text.chars().count()).max().unwrap_or(1)
 }
 
 /// Round numbers between two, at least two of them if there are any: one alone says nothing of the scale.
@@ -137,5 +156,20 @@ mod tests {
         assert_eq!(frame.size, DVec2::new(560.0, 280.0));
         assert_eq!(frame.page(window.min), DVec2::new(50.0, frame.bottom()));
         assert_eq!(frame.page(window.max), DVec2::new(frame.right(), 40.0));
+    }
+
+    #[test]
+    fn long_numbers_leave_room_for_the_name_of_their_axis() {
+        for (low, side) in [(0.0, 1.0), (19.999, 2e-3), (5e6, 10.0), (1999.999_999, 2e-6), (-5e6, 0.01)] {
+            let window = Window::new(DVec2::splat(low), DVec2::splat(low + side));
+            let frame = PlotFrame::with_room(window, DVec2::new(72.0, 44.0));
+            let mut out = String::new();
+            draw(&mut out, &frame, Plane::new(super::super::Axis::Z, 0.0));
+            let name = out.lines().find(|line| line.contains("rotate(-90)")).unwrap();
+            let x = name.split("translate(").nth(1).unwrap().split(' ').next().unwrap();
+            assert!(x.parse::<f64>().unwrap() >= NAME, "{low}: {name}");
+        }
+        let usual = Window::new(DVec2::ZERO, DVec2::ONE);
+        assert_eq!(PlotFrame::with_room(usual, DVec2::new(72.0, 44.0)).origin, DVec2::new(72.0, 44.0));
     }
 }

@@ -74,7 +74,21 @@ impl fmt::Display for Decimal {
     }
 }
 
-/// Numbers that belong together as text: as plain digits if those of all are few, or else like 5e−7.
+impl Decimal {
+    /// All digits, before and behind the point. `None` if they are very many.
+    fn in_full(self) -> Option<String> {
+        let digits = self.mantissa.unsigned_abs();
+        let one = 10u64.checked_pow(self.exponent.unsigned_abs())?;
+        let sign = if self.mantissa < 0 { "−" } else { "" };
+        if self.exponent >= 0 {
+            return Some(format!("{sign}{}", digits.checked_mul(one)?));
+        }
+        let places = self.exponent.unsigned_abs() as usize;
+        Some(format!("{sign}{}.{:0places$}", digits / one, digits % one))
+    }
+}
+
+/// Numbers that belong together as text: as plain digits if those of all are few, or else like 5e−7 where that is shorter.
 pub fn written(numbers: &[Decimal]) -> Vec<String> {
     let is_plain = |n: &Decimal| n.mantissa == 0 || (-5..=4).contains(&n.exponent);
     if numbers.iter().all(is_plain) {
@@ -92,7 +106,12 @@ pub fn written(numbers: &[Decimal]) -> Vec<String> {
             _ => format!("{sign}{digits}e{}{}", if exponent < 0 { "−" } else { "" }, exponent.unsigned_abs()),
         }
     };
-    numbers.iter().map(text).collect()
+    let short: Vec<String> = numbers.iter().map(text).collect();
+    let widest = |texts: &[String]| texts.iter().map(|text| text.chars().count()).max();
+    match numbers.iter().map(|n| n.in_full()).collect::<Option<Vec<String>>>() {
+        Some(full) if widest(&full) <= widest(&short) => full,
+        Some(_) | None => short,
+    }
 }
 
 /// About `count`/2 to `count` round numbers from `min` to `max`, evenly spaced and with the same number
@@ -129,6 +148,10 @@ mod tests {
         assert_eq!(of(&[(-1, -5), (-5, -6), (0, 0), (5, -6), (10, -6)]), "−1e−5 −5e−6 0 5e−6 1e−5");
         assert_eq!(of(&[(-1, -3), (0, 0), (5, -4)]), "−0.001 0 0.0005");
         assert_eq!(of(&[(20, 4), (1, 5)]), "2e5 1e5");
+        // few steps far from zero
+        let far = [(19_999_999_995, -7), (20_000_000_000, -7), (20_000_000_005, -7)];
+        assert_eq!(of(&far), "1999.9999995 2000.0000000 2000.0000005");
+        assert_eq!(of(&[(-123_456, 5), (1, 300)]), "−123456e5 1e300");
     }
 
     #[track_caller]

@@ -44,9 +44,10 @@ pub(super) fn drawing(
     samples: usize,
     id: &str,
 ) -> Result<Drawing, SliceError> {
-    let frame = PlotFrame::new(window, DVec2::new(LEFT, TOP));
+    let frame = PlotFrame::with_room(window, DVec2::new(LEFT, TOP));
     let mut body = String::new();
-    let _ = writeln!(body, r#"<text x="{LEFT}" y="{}" font-size="16">{plane} m</text>"#, TOP - 16.0);
+    let _ =
+        writeln!(body, r#"<text x="{}" y="{}" font-size="16">{plane} m</text>"#, frame.origin.x, TOP - 16.0);
     for (k, cut) in cuts.iter().enumerate() {
         let (colour, angle) = (COLOURS[k % COLOURS.len()], ANGLES[k % ANGLES.len()]);
         let _ = writeln!(

@@ -71,13 +71,14 @@ pub fn drawing(
     scale: &Scale,
     id: &str,
 ) -> Drawing {
-    let frame = PlotFrame::new(samples.window, DVec2::new(LEFT, TOP));
+    let frame = PlotFrame::with_room(samples.window, DVec2::new(LEFT, TOP));
     let mut out = format!(
-        r##"<text x="{LEFT}" y="{2}" font-size="16">{0}<tspan fill="#555" dx="9">{1} m</tspan></text>
+        r##"<text x="{3}" y="{2}" font-size="16">{0}<tspan fill="#555" dx="9">{1} m</tspan></text>
 "##,
         escaped(name),
         samples.plane,
-        TOP - 16.0
+        TOP - 16.0,
+        frame.origin.x
     );
     let labels = bands_and_lines(&mut out, field, samples, &frame, scale);
     undefined_cells(&mut out, samples, &frame, id);
