@@ -98,7 +98,8 @@ UNIT_MISMATCH = "E0212":
 only lengths and angles are meaningful.";
 BARE_OVERRIDE = "W0214":
 "The file writes the value of this param in a unit such as mm, and a number without one is given, as by -D. Numbers without a unit
-are in SI units everywhere, so `-D d=8` is 8 m. Write the unit: `-D d=8mm`, or `-D d=8m` if metres are meant.";
+are in SI units everywhere, so `-D d=8` is 8 m. Write the unit: `-D d=8mm`, or `-D d=8m` if metres are meant. Where the range of
+the param holds the number in one of both units only, nothing is asked.";
 ATTRIBUTE = "E0213":
 "An attribute stands before a solid and says what is wanted of it beside its shape. There is one: `@tolerance(1e-6)`,
 the largest |computed ω − exact ω| that is accepted, over the box of the scene that uses the solid or, without a scene,
@@ -312,6 +313,13 @@ smaller than what was meant. It is right if the solid reaches far below z0 and f
 
     rfm 1
     solid a = sphere(1).loft(sphere(2), 0, 1)                # sphere(1).at([x, y, 0]).loft(sphere(2).at([x, y, 0]), 0, 1)";
+BARE_RANGE = "W0427":
+"The value of the param has a unit such as mm or deg, and the range has none. Numbers without a unit are in SI units
+everywhere, so that `45 deg in 0 .. 90` reaches to 90 radians, which are 14 turns. Write the unit at both ends; zero needs none.
+
+    rfm 1
+    param alpha = 45 deg in 0 .. 90                          # 45 deg in 0 .. 90 deg
+    solid s = box().rotate_z(alpha)";
 FLUID_IN_OBSTACLE = "W0501":
 "Part of the fluid's shape lies inside an obstacle, or outside the box or the container. Those particles are carved off before the
 run starts. `rfm run` counts them. `rfm check` and editors estimate by samples how much of the shape is taken, and tell of it where
@@ -420,7 +428,8 @@ PICTURE_ASIDE = "W0525":
 "`look_at` in the block `picture` is the place in the middle of the pictures, in metres. It lies outside of the box, where nothing
 is drawn, so pictures may be empty. Left out, it is the middle of the box; `zoom` makes what is there larger.";
 HEAVY_FLUID = "W0526":
-"No liquid is so dense: water has 998 kg/m³, mercury 13 546, and molten metals have up to 20 000. Most often another unit was meant:
+"No liquid is so dense, or so light: hydrogen has 71 kg/m³, water 998, mercury 13 546, and molten metals have up to 20 000. Most
+often another unit was meant, and a light fluid with a unit, as in `1.2 kg/m^3`, is not asked about:
 a bare number is in kg/m³, so water is `1000` or `1 g/cm^3`. Forces, pressures and loads grow with the density.";
 CROWDED = "W0527":
 "Sums over neighbours are made for particles that stand about a spacing apart in all directions. A fluid that is pressed flat, or

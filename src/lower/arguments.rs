@@ -1,7 +1,7 @@
 //! Calls: arguments are bound to parameters, then the body is evaluated in a scope of its own.
 
 use super::builtins;
-use super::dimensions::Measure;
+use super::dimensions::{Measure, is_foreign_quantity};
 use super::foreign;
 use super::lowering::{Call, Local, Lowering, Scope};
 use super::names::Kind;
@@ -36,15 +36,20 @@ impl<'a> Lowering<'a> {
                     let mixed = self.mix_of_shapes(name, arguments);
                     return self.fail(mixed.unwrap_or(foreign));
                 }
+                let in_an_import = self.names.in_an_import(self.scope.source, &name.text);
                 let mut candidates = self.names.candidates(self.scope.source, true);
                 candidates.extend(builtins::names().map(String::from));
                 let message = format!("unknown function or shape `{}`", name.text);
                 let diagnostic = Diagnostic::error(Code::UNKNOWN_NAME, name.span, message)
                     .at("not defined above")
                     .suggest(&name.text, candidates.iter().map(String::as_str));
-                let diagnostic = match self.names.defined_later(self.scope.source, &name.text) {
-                    Some(later) => diagnostic.label(later, "defined here"),
-                    None => diagnostic,
+                let later = self.names.defined_later(self.scope.source, &name.text);
+                let diagnostic = match (later, in_an_import) {
+                    (Some(later), _) => diagnostic.label(later, "defined here"),
+                    (None, Some(qualified)) => diagnostic
+                        .help(format!("write `{qualified}(…)`"))
+                        .edit(name.span, &name.text, qualified, false),
+                    (None, None) => diagnostic,
                 };
                 self.fail(diagnostic)
             }
@@ -127,7 +132,9 @@ impl<'a> Lowering<'a> {
         let mut fits = true;
         let standard = !source.is_users();
         for (position, argument) in arguments.iter().enumerate() {
-            let value = self.expr(&argument.value);
+            // what it measures is told below, where it is known what is asked for
+            let is_foreign = standard && is_foreign_quantity(&argument.value);
+            let value = if is_foreign { Value::Failed } else { self.expr(&argument.value) };
             let parameter = match self.parameter(function, position, argument) {
                 Parameter::Known(parameter) => parameter,
                 Parameter::Unknown => {
@@ -139,8 +146,13 @@ impl<'a> Lowering<'a> {
                     return None;
                 }
             };
-            if standard && value != Value::Failed {
-                fits &= self.measures(&argument.value, Measure::of(name, &parameter));
+            let measure = Measure::of(name, &parameter);
+            if standard && (value != Value::Failed || is_foreign) {
+                fits &= self.measures(&argument.value, measure);
+            }
+            if is_foreign && measure == Measure::Any {
+                fits = false;
+                self.expr(&argument.value);
             }
             if bound.iter().any(|local| local.name == parameter) {
                 let at = self.user_span(argument.value.span);

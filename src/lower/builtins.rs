@@ -362,8 +362,25 @@ impl Lowering<'_> {
         };
         let at = self.user_span(origin.unwrap_or(span));
         let wanted = if is_broken { "a whole number" } else { "positive" };
+        // what the user wrote may be made of a layer
+        let call = self.scope.calls.iter().find(|call| !call.source.is_users()).map(|call| &*call.function);
+        let what = match (what, call) {
+            ("the thickness of a layer", Some("extrude")) => "the height of what is extruded",
+            _ => what,
+        };
         let message = format!("{what} must be {wanted}, found {number}");
         let diagnostic = Diagnostic::error(Code::OUT_OF_RANGE, at, message);
+        let ends = match what {
+            "the height of what is extruded" | "the height of a loft" => Some(["z0", "z1"]),
+            "the thickness of a layer" => Some(["low", "high"]),
+            _ => None,
+        };
+        if let Some([low, high]) = ends {
+            return self.fail(diagnostic.help(match number < 0.0 {
+                true => format!("`{low}` is above `{high}`: exchange them"),
+                false => format!("`{low}` is to be less than `{high}`"),
+            }));
+        }
         let is_negative = number < 0.0 && number.is_finite();
         if is_negative && what.starts_with("the size of a box along") {
             return self.fail(

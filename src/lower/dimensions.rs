@@ -247,6 +247,17 @@ impl Lowering<'_> {
     }
 }
 
+/// Whether an expression is a number with a unit that no shape has, such as `3 s`, or a vector with one.
+pub(super) fn is_foreign_quantity(expr: &Expr) -> bool {
+    match &expr.kind {
+        ExprKind::Quantity { unit, .. } => parse_unit(&unit.text)
+            .is_some_and(|unit| ![Dimension::LENGTH, Dimension::ANGLE].contains(&unit.dimension)),
+        ExprKind::Negate(inner) => is_foreign_quantity(inner),
+        ExprKind::Vector(parts) => parts.iter().any(is_foreign_quantity),
+        _ => false,
+    }
+}
+
 /// Whether an expression is a coordinate, or one with something added.
 fn is_coordinate(expr: &Expr) -> bool {
     match &expr.kind {

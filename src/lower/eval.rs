@@ -141,16 +141,24 @@ impl Lowering<'_> {
         };
         if self.in_shape && ![Dimension::LENGTH, Dimension::ANGLE].contains(&parsed.dimension) {
             let message = format!("`{}` is not a length or an angle", unit.text);
+            // what moves is a formula of `t`, in which a name for the quantity is needed
             let name = match parsed.dimension {
-                Dimension::TURN_RATE | Dimension::FREQUENCY => "w",
-                Dimension::SPEED => "v",
-                _ => "q",
+                Dimension::TURN_RATE | Dimension::FREQUENCY => Some("w"),
+                Dimension::SPEED => Some("v"),
+                Dimension::TIME => Some("q"),
+                _ => None,
             };
-            let help = format!(
-                "inside shapes only lengths and angles have units; define a name above: write \
-                 `param {name} = {value} {}`, and `{name}` here",
-                unit.text
-            );
+            let help = match name {
+                Some(name) => format!(
+                    "inside shapes only lengths and angles have units; define a name above: write \
+                     `param {name} = {value} {}`, and `{name}` here",
+                    unit.text
+                ),
+                None => format!(
+                    "inside shapes only lengths and angles have units: write a length such as `{value} mm`, or a number \
+                     without a unit"
+                ),
+            };
             return self.fail(Diagnostic::error(Code::UNIT_MISMATCH, unit.span, message).help(help));
         }
         Value::Number(self.constant(value * parsed.factor))
@@ -217,6 +225,12 @@ impl Lowering<'_> {
             return self.fail(diagnostic);
         }
         let later = self.names.defined_later(self.scope.source, name);
+        if let Some(qualified) = self.names.in_an_import(self.scope.source, name).filter(|_| later.is_none())
+        {
+            let diagnostic = diagnostic.at("not defined in this file");
+            return self
+                .fail(diagnostic.help(format!("write `{qualified}`")).edit(span, name, qualified, false));
+        }
         let diagnostic = match (later, foreign::value(name, self.in_scene)) {
             (Some(later), _) => diagnostic
                 .at("not defined above")
@@ -402,10 +416,17 @@ impl Lowering<'_> {
             && low > high
         {
             let message = "no place fulfils both comparisons: the ends are exchanged";
+            let written = match (self.written(first), self.written(&rest[0].2), self.written(&rest[1].2)) {
+                (Some(a), Some(between), Some(b)) => {
+                    let sign = if upwards(rest[0].0) { "<=" } else { ">=" };
+                    format!("`{b} {sign} {between} {sign} {a}`")
+                }
+                _ => "`a <= e <= b` with the smaller end as `a`".to_string(),
+            };
             self.report(
                 Diagnostic::warning(Code::REVERSED_CHAIN, span, message)
                     .at(format!("{low} is greater than {high}"))
-                    .help("exchange them: as it stands it is the layer between them"),
+                    .help(format!("write {written}; a chain is read as this layer all the same")),
             );
         }
         let other = self.binary(Binary::Sub, third, terms[1], span);

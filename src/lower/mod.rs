@@ -7,6 +7,7 @@
 //! Invariant: the graph is built as the text is written. No formula is rearranged here.
 
 mod arguments;
+mod bare_ranges;
 mod builtins;
 mod choice;
 mod columns;
@@ -55,6 +56,7 @@ use crate::ir::Expr as Operation;
 use crate::quantity::{Unit, in_unit, parse_unit};
 use crate::syntax::Ast;
 use crate::syntax::ast::{Argument, Attribute, Definition, Expr, ExprKind, Function, Item, Name, Param};
+use bare_ranges::BareRange;
 use lowering::{KnownDimension, Lowering};
 use names::{Kind, RESERVED, TIME};
 use value::Value;
@@ -230,8 +232,14 @@ impl<'a> Lowering<'a> {
         let unit = unit_of(&param.value).map(|(unit, text)| (unit, text.to_string()));
         let given =
             ParamValue { name: qualified, value, range, unit, doc: param.doc.clone(), span: param.name.span };
-        let fits = (overridden.is_none() || self.override_fits((&given, stated), options))
-            && self.param_fits(param, &given, overridden.map(|_| options));
+        let bare = self.bare_range(param, &given, stated);
+        if let Some(bare) = &bare
+            && (overridden.is_some() || bare.holds(value))
+        {
+            self.warn_of_bare_range(param, &given, bare);
+        }
+        let fits = (overridden.is_none() || self.override_fits((&given, stated), bare.as_ref(), options))
+            && self.param_fits(param, &given, bare.as_ref(), overridden.map(|_| options));
         let is_open = options.open.as_ref().is_some_and(|open| !open.fixed.contains(&given.name));
         let value_now = match (fits, is_open) {
             (false, _) => Value::Failed,
@@ -263,12 +271,22 @@ impl<'a> Lowering<'a> {
     /// Whether the unit of an override fits the one in which the file writes the param. If not, this is reported; a
     /// number without a unit is accepted with a warning.
     /// `stated` is the value in the file.
-    fn override_fits(&mut self, (param, stated): (&ParamValue, Option<f64>), options: &Options) -> bool {
+    fn override_fits(
+        &mut self,
+        (param, stated): (&ParamValue, Option<f64>),
+        bare: Option<&BareRange>,
+        options: &Options,
+    ) -> bool {
         let Some((unit, text)) = &param.unit else { return true };
         let name = &param.name;
         let Some(dimension) = options.dimensions.get(name) else {
-            // a range shows which unit is meant
-            if unit.factor != 1.0 && param.value != 0.0 && param.range.is_none() {
+            // a range that holds the number in one of both units only shows which one is meant
+            let may_be = param.range.is_none_or(|range| {
+                let is_in = |(low, high): (f64, f64), value: f64| low <= value && value <= high;
+                let in_unit = bare.map_or(range, BareRange::in_unit);
+                is_in(range, param.value) && is_in(in_unit, param.value * unit.factor)
+            });
+            if unit.factor != 1.0 && param.value != 0.0 && may_be {
                 let si = unit.dimension.unit().unwrap_or("in SI units");
                 let message =
                     format!("`{name}` = {0} means {0} {si}, and the file writes it in {text}", param.value);
@@ -319,7 +337,13 @@ impl<'a> Lowering<'a> {
 
     /// Whether a param's value is a finite number within its range. If not, this is reported. `options` are given
     /// if they have set the value.
-    fn param_fits(&mut self, param: &Param, given: &ParamValue, options: Option<&Options>) -> bool {
+    fn param_fits(
+        &mut self,
+        param: &Param,
+        given: &ParamValue,
+        bare: Option<&BareRange>,
+        options: Option<&Options>,
+    ) -> bool {
         let (value, shown) = (given.value, given.shown(given.value));
         if let Some((low, high)) = given.range
             && low > high
@@ -367,7 +391,13 @@ impl<'a> Lowering<'a> {
             } else {
                 let message =
                     format!("`{}` = {shown} lies outside its range {first} .. {last}", param.name.text);
-                Diagnostic::error(Code::OUT_OF_RANGE, param.value.span, message)
+                let diagnostic = Diagnostic::error(Code::OUT_OF_RANGE, param.value.span, message);
+                match (bare, &param.range) {
+                    (Some(bare), Some((from, to))) => {
+                        diagnostic.label(from.span.to(to.span), "without a unit").help(&bare.help)
+                    }
+                    _ => diagnostic,
+                }
             };
             self.report(diagnostic);
         } else if !value.is_finite() {

@@ -121,6 +121,21 @@ impl<'a> Names<'a> {
         names
     }
 
+    /// A name that a text lacks as its imports have it, such as `parts.post` for `post`.
+    pub fn in_an_import(&self, source: SourceId, name: &str) -> Option<String> {
+        let own = match source {
+            SourceId::Prelude => None,
+            SourceId::File => Some(&self.file),
+            SourceId::Import(number) => self.imports.get(&number),
+        };
+        let has_it = |(_, global): &(&String, &Global<'a>)| match global.kind {
+            Kind::Import(of) => self.offered(of).iter().any(|offered| offered == name),
+            Kind::Value(_) | Kind::Solid(_) | Kind::Function(_) | Kind::Scene => false,
+        };
+        let import = own?.iter().filter(has_it).map(|(import, _)| import).min()?;
+        Some(format!("{import}.{name}"))
+    }
+
     /// The file that a name stands for, if it is that of an import; counts as a use.
     pub fn import(&mut self, source: SourceId, name: &str) -> Option<SourceId> {
         match self.table(source).get_mut(name)? {

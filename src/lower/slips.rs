@@ -11,7 +11,7 @@ use crate::diagnostic::{Code, Diagnostic, SourceId, Span};
 use crate::geom::significant;
 use crate::ir::{Binary, Node};
 use crate::quantity::{Dimension, parse_unit};
-use crate::syntax::ast::{Expr, ExprKind, Fold, Logic, MulOp};
+use crate::syntax::ast::{Argument, Expr, ExprKind, Fold, Logic, MulOp};
 use crate::syntax::foreign;
 
 impl Lowering<'_> {
@@ -427,6 +427,22 @@ impl Lowering<'_> {
         };
         self.report(Diagnostic::error(Code::UNIT_MISMATCH, span, message).help(help));
         false
+    }
+
+    /// The vector that is meant by arguments with the names of axes, as in `.move(y=2)` and `.scale(x=2)`.
+    pub fn vector_by_axes(&self, method: &str, arguments: &[Argument]) -> Option<String> {
+        let other = match method {
+            "move" | "mirror" => "0",
+            "scale" => "1",
+            _ => return None,
+        };
+        let mut parts = [other; 3];
+        for argument in arguments {
+            let name = &argument.name.as_ref()?.text;
+            let axis = ["x", "y", "z"].iter().position(|axis| axis == name)?;
+            parts[axis] = self.written(&argument.value)?;
+        }
+        (!arguments.is_empty()).then(|| format!(".{method}([{}])", parts.join(", ")))
     }
 
     /// How the arguments of a method are written, for a call that has them wrong.

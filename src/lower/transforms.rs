@@ -3,7 +3,7 @@
 //! A shape S moved by a transformation T has ω(T⁻¹ p): its coordinates are replaced by those of the point
 //! before the transformation. Displacements and angles may depend on time: the shape then moves.
 
-use super::dimensions::Measure;
+use super::dimensions::{Measure, is_foreign_quantity};
 use super::lowering::Lowering;
 use super::value::Value;
 use crate::diagnostic::{Code, Diagnostic, Span};
@@ -203,9 +203,15 @@ impl<'a> Lowering<'a> {
             let Some(slot) = slot else {
                 return self.fail(self.wrong_arguments(method, parameters, arguments, span));
             };
-            let value = self.expr(&argument.value);
             let (parameter, kind) = parameters[slot];
             let measure = kind.measure(parameter);
+            if kind != ParameterKind::Angle
+                && is_foreign_quantity(&argument.value)
+                && !self.measures(&argument.value, measure)
+            {
+                return Value::Failed;
+            }
+            let value = self.expr(&argument.value);
             if kind != ParameterKind::Angle
                 && value != Value::Failed
                 && !self.measures(&argument.value, measure)
@@ -249,8 +255,10 @@ impl<'a> Lowering<'a> {
     ) -> Diagnostic {
         let names: Vec<&str> = parameters.iter().map(|(name, _)| *name).collect();
         let message = format!("the arguments of `.{}` are ({})", method.text, names.join(", "));
+        let by_axes = self.vector_by_axes(&method.text, arguments);
         let arguments: Vec<&Expr> = arguments.iter().map(|argument| &argument.value).collect();
-        let help = format!("write `{}`", self.call_that_works(&method.text, &arguments));
+        let call = by_axes.unwrap_or_else(|| self.call_that_works(&method.text, &arguments));
+        let help = format!("write `{call}`");
         Diagnostic::error(Code::ARGUMENTS, self.user_span(span), message).help(help)
     }
 

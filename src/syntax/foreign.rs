@@ -12,6 +12,7 @@ pub(super) fn operator(word: &str) -> Option<&'static str> {
         "mod" | "rem" => REMAINDER,
         "xor" => "write `(a or b) \\ (a and b)`",
         "div" => "write `a/b`",
+        "not" => "write `a and not b`, or `a \\ b`",
         "union" | "plus" | "OR" | "Or" => "write `a or b`",
         "intersect" | "intersection" | "with" | "AND" | "And" => "write `a and b`",
         "minus" | "without" | "except" | "difference" | "subtract" => "write `a \\ b`",

@@ -103,7 +103,7 @@ impl<'t> Slip<'t> {
         if KEYWORDS.contains(&self.found) && called && !self.ends_an_operand() {
             return self.operator_as_a_function();
         }
-        if let Some(known) = self.word_behind_a_value() {
+        if let Some(known) = self.word_behind_a_value().or_else(|| self.argument_without_brackets()) {
             return Some(known);
         }
         if self.on_its_line().trim().is_empty() {
@@ -392,6 +392,9 @@ impl<'t> Slip<'t> {
     /// A character that has no meaning where it stands.
     fn mark(&self) -> Option<Diagnostic> {
         let (before, after) = (self.before(), self.after());
+        if let Some(known) = self.dots_in_square_brackets() {
+            return Some(known);
+        }
         if let Some(known) = self.range_in_square_brackets().or_else(|| self.special_variable()) {
             return Some(known);
         }
@@ -427,6 +430,10 @@ impl<'t> Slip<'t> {
             "'" | "“" | "”" | "„" | "«" | "‘" => "a text stands in double quotes: `\"…\"`",
             "∪" => "shapes are joined by `or` or `∨`: write `a or b`",
             "∩" => "shapes are cut by `and` or `∧`: write `a and b`",
+            "@" => "an attribute stands before a solid, and its value in brackets, as in `@tolerance(1e-6)`",
+            "–" | "—" => {
+                "this is a dash: the sign of a difference is `-`, as in `a - b`, and shapes are cut by `a \\ b`"
+            }
             "≠" => "that would leave out a surface of zero thickness: write `a <= b` or `a >= b`",
             "√" => "a root is written `sqrt(2)`",
             "%" if number_ends(before) => "a percentage is written as a number: `0.1` for 10 %",

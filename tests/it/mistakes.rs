@@ -3,6 +3,7 @@
 
 mod commands;
 mod half_remembered;
+mod one_line;
 mod openscad;
 mod scenes;
 

@@ -48,3 +48,23 @@ fn params_come_from_files_and_flags_go_before_them() {
     let outcome = rfm(folder.path(), &["check", "a.rfm", "-P", "bad.toml", "-D", "d=8"]).expect(0);
     assert!(outcome.stderr.contains("`d` = 8 means 8 m"), "{}", outcome.stderr);
 }
+
+#[test]
+fn a_number_that_may_be_in_either_unit_is_asked_about() {
+    let folder = tempfile::tempdir().unwrap();
+    for (param, given, is_asked) in [
+        ("d = 20 mm in 1 mm .. 100 m", "d=30", true),
+        ("d = 20 mm in 1 mm .. 100 mm", "d=0.03", false),
+        ("d = 20 mm in 1 .. 100", "d=30", true),
+        ("d = 45 deg in 0 deg .. 90 deg", "d=1", true),
+        ("d = 45 deg in 0 .. 90", "d=30", true),
+        ("d = 45 deg in 0 deg .. 90 deg", "d=0", false),
+        ("d = 2 m in 1 .. 3", "d=3", false),
+    ] {
+        let text = format!("rfm 1\nparam {param}\nsolid s = sphere(1).move([d, 0, 0])\n");
+        std::fs::write(folder.path().join("a.rfm"), text).unwrap();
+        let found =
+            rfm(folder.path(), &["check", "a.rfm", "--budget", "100ms", "-D", given]).expect(0).stderr;
+        assert_eq!(found.contains("W0214"), is_asked, "{param}, {given}: {found}");
+    }
+}

@@ -15,6 +15,9 @@ use crate::syntax::ast::Entry;
 /// A fluid denser than this, kg/m³, is asked about: molten osmium has 20 000.
 const MOST_DENSITY: f64 = 25_000.0;
 
+/// A fluid that is lighter than this, kg/m³, and whose density has no unit is asked about: liquid hydrogen has 71.
+const LEAST_DENSITY: f64 = 30.0;
+
 /// What a fluid has at the start and not later, and what is said where it depends on the time.
 pub(super) struct Start {
     what: &'static str,
@@ -257,6 +260,15 @@ impl<'a> Lowering<'a> {
                 Diagnostic::warning(Code::HEAVY_FLUID, value.span, message)
                     .help("water has 998 kg/m³, mercury 13 546: is the unit the one that is meant? `1 g/cm^3` is 1000 kg/m³"),
             );
+        }
+        if let (Some(density), Some((_, value))) = (density, block.setting(keys::DENSITY.name))
+            && (0.0..LEAST_DENSITY).contains(&density)
+            && self.is_bare(value)
+        {
+            let message = format!("a fluid of {} kg/m³ is lighter than any liquid", significant(density));
+            let written = self.written(value).filter(|text| text.parse::<f64>().is_ok()).unwrap_or("1");
+            let help = format!("is `{written} g/cm^3` meant? if not, write `{written} kg/m^3`");
+            self.report(Diagnostic::warning(Code::HEAVY_FLUID, value.span, message).help(help));
         }
         let mass = self.number_key(block, &keys::MASS);
         let spacing = self.stated_number(block, &keys::SPACING);

@@ -188,6 +188,12 @@ impl<'a> Lowering<'a> {
                 .is_some_and(|global| matches!(global.kind, Kind::Solid(_) | Kind::Value(_))),
             _ => false,
         };
+        if key == "solver"
+            && let ExprKind::Name(name) = &value.kind
+            && let Some(method) = Method::named(name)
+        {
+            return format!("method: {}", method.name());
+        }
         block_form(key, self.written(value).unwrap_or("…"), is_shape)
             .unwrap_or_else(|| format!("{key} {{ … }}"))
     }
@@ -224,7 +230,11 @@ impl<'a> Lowering<'a> {
                 let diagnostic = Diagnostic::error(Code::SCENE_KEY, key.span, message)
                     .help(format!("its keys are {}", known.join(", ")))
                     .suggest(&key.text, known.iter().copied());
-                let own = foreign::key(&key.text);
+                let own = match (what, key.text.as_str()) {
+                    // an obstacle has a solid, a fluid a shape
+                    ("a fluid", "solid") => Some("shape"),
+                    (_, word) => foreign::key(word),
+                };
                 // a word of other programs may be a key of a block here
                 let literal = blocks_with(&key.text, declared);
                 let own = own.filter(|_| literal.is_empty());

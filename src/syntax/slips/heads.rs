@@ -1,7 +1,7 @@
 //! Slips in the heads of items, folds and blocks.
 
 use super::super::foreign;
-use super::super::words::ITEM_WORDS;
+use super::super::words::{ITEM_WORDS, KEYWORDS};
 use super::Slip;
 use super::pieces::{bracketed, fits, last_number, last_word, parts, unclosed};
 use crate::diagnostic::{Code, Diagnostic, Span};
@@ -11,6 +11,10 @@ pub(super) const FOLDS: [&str; 6] = ["any", "all", "sum", "product", "min", "max
 
 /// Functions whose powers mathematics writes behind their names.
 const POWERS_OF: [&str; 9] = ["sin", "cos", "tan", "sinh", "cosh", "tanh", "log", "ln", "exp"];
+
+/// Functions whose argument mathematics writes without brackets.
+const FUNCTIONS: [&str; 14] =
+    ["sin", "cos", "tan", "asin", "acos", "atan", "sinh", "cosh", "tanh", "log", "ln", "exp", "sqrt", "abs"];
 
 impl Slip<'_> {
     /// A mark that stands where the head of something is written otherwise.
@@ -71,6 +75,19 @@ impl Slip<'_> {
             return diagnostic.help(format!("a name has no quotes, as in `{head} {name}`"));
         }
         diagnostic.help("only a param has a description: write it as a comment, behind `#`")
+    }
+
+    /// `sin x`
+    pub(super) fn argument_without_brackets(&self) -> Option<Diagnostic> {
+        let function = last_word(self.on_its_line().trim_end());
+        let is_operand = !KEYWORDS.contains(&self.found) && FUNCTIONS.contains(&function);
+        is_operand.then(|| {
+            let call = match bracketed(self.after()).filter(|inner| fits(&[inner])) {
+                Some(inner) => format!("{function}({}({inner}))", self.found),
+                None => format!("{function}({})", self.found),
+            };
+            self.unexpected().help(format!("the argument of a function stands in brackets: write `{call}`"))
+        })
     }
 
     /// `|x|`
@@ -237,7 +254,9 @@ impl Slip<'_> {
     pub(super) fn block_without_braces(&self) -> Option<Diagnostic> {
         let line = self.before().lines().last()?;
         let (block, name) = line.trim().split_once(' ')?;
+        let is_scene = block == "scene" && !self.in_braces() && self.found != "}";
         let written = match block {
+            "scene" => format!("scene {name} {{` here, and behind its last block `}}"),
             "obstacle" | "container" => format!("{block} {{ solid: {name} }}"),
             "fluid" => format!("fluid {name} {{ shape: …, density: 1000 }}"),
             "probe" => format!("probe {name} {{ energy: water, every: 0.1 s }}"),
@@ -246,7 +265,7 @@ impl Slip<'_> {
         let is_name = last_word(name) == name && fits(&[name]);
         let start = self.text[..self.at].trim_end().len() - line.trim().len();
         let span = Span::new(self.span.source, start, start + line.trim().len());
-        (self.in_braces() && is_name).then(|| {
+        ((self.in_braces() && block != "scene" || is_scene) && is_name).then(|| {
             Diagnostic::error(Code::SYNTAX, span, format!("`{block}` has no block"))
                 .at("expected `{`")
                 .help(format!("write `{written}`"))

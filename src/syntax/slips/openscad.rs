@@ -41,6 +41,22 @@ impl Slip<'_> {
         Some(self.unexpected().at(what).help(format!("write `{written}`")))
     }
 
+    /// `any i in [0..6]: sphere(i)`, of which the place is the second dot.
+    pub(super) fn dots_in_square_brackets(&self) -> Option<Diagnostic> {
+        let (head, start) = self.on_its_line().rsplit_once('[').filter(|_| self.found == ".")?;
+        let (end, behind) = self.after().lines().next()?.split_once(']')?;
+        let head = head.trim_end().strip_suffix(" in")?.trim_end();
+        let variable = last_word(head);
+        let fold = last_word(head.strip_suffix(variable)?.trim_end());
+        let (start, end) = (start.trim_end_matches('.').trim(), end.trim_start_matches(['.', '=']).trim());
+        let body = first_part(behind.trim_start().strip_prefix(':')?);
+        let is_range = FOLDS.contains(&fold) && !variable.is_empty() && fits(&[start, end, body]);
+        is_range.then(|| {
+            let written = format!("{fold} {variable} in {start}..{end}: {body}");
+            self.unexpected().help(format!("a range has no brackets: write `{written}`"))
+        })
+    }
+
     /// `for (i = [0:5]) sphere(i)` at the beginning of a line.
     pub(super) fn loop_of_its_own(&self) -> Option<Diagnostic> {
         let colon = self.text[self.at..].lines().next()?.find(':').filter(|_| self.found == "for")?;
