@@ -13,8 +13,8 @@ use super::shared::Shared;
 use super::sweep::options::{Again, SweepOptions};
 pub(super) use super::values::CutFlag;
 use super::values::{
-    Deny, Frames, Tolerance, aabb, camera, cut, deny, frames, length, plane, point, seconds, steps,
-    tolerance, window,
+    Deny, Frames, Tolerance, aabb, camera, cells, cut, deny, finite_point, frames, length, plane, seconds,
+    steps, tolerance, window,
 };
 use glam::DVec3;
 use rfm::geom::Aabb;
@@ -180,7 +180,7 @@ pub(super) struct Eval {
     #[arg(short, long, value_name = "NAME")]
     pub solid: Option<String>,
     /// A point; may be repeated
-    #[arg(long, value_name = "X,Y,Z", value_parser = point, allow_hyphen_values = true)]
+    #[arg(long, value_name = "X,Y,Z", value_parser = finite_point, allow_hyphen_values = true)]
     pub at: Vec<DVec3>,
     /// A CSV file of points with the header x,y,z; `-` is standard input
     #[arg(long, value_name = "FILE")]
@@ -228,6 +228,7 @@ pub(super) struct Mesh {
         long,
         value_name = "N",
         default_value_t = 128,
+        value_parser = cells,
         conflicts_with = "cell",
         allow_negative_numbers = true
     )]
@@ -429,7 +430,7 @@ pub(super) struct Run {
     #[arg(long)]
     pub no_frames: bool,
     /// Cells of the obstacle's mesh along its longest side
-    #[arg(long, value_name = "N", default_value_t = 96)]
+    #[arg(long, value_name = "N", default_value_t = 96, value_parser = cells, allow_negative_numbers = true)]
     pub mesh_cells: usize,
     #[command(flatten)]
     pub sweep: SweepOptions,

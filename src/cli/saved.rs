@@ -86,6 +86,13 @@ impl RunFigures {
 pub(super) fn collection(folder: &Path) -> Result<Vec<FrameEntry>, Failure> {
     let path = folder.join("particles.pvd");
     if !path.is_file() {
+        if let Some(first) = first_run_of_a_sweep(folder) {
+            return Err(Failure::usage(format!(
+                "`{}` holds a sweep, and each of its folders a run: name one of them, such as `{}`",
+                folder.shown(),
+                first.shown()
+            )));
+        }
         return Err(Failure::usage(format!(
             "there are no frames in `{}`: `rfm run` lists them in particles.pvd, unless it is told --no-frames",
             folder.shown()
@@ -96,6 +103,15 @@ pub(super) fn collection(folder: &Path) -> Result<Vec<FrameEntry>, Failure> {
         return Err(Failure::usage(format!("cannot read `{}`: it lists no frames", path.shown())));
     }
     Ok(entries)
+}
+
+/// The first folder of a sweep that holds the frames of a run. `None` if the folder is not that of a sweep.
+fn first_run_of_a_sweep(folder: &Path) -> Option<PathBuf> {
+    if !folder.join("index.json").is_file() {
+        return None;
+    }
+    let inner = std::fs::read_dir(folder).ok()?.flatten().map(|entry| entry.path());
+    inner.filter(|path| path.join("particles.pvd").is_file()).min()
 }
 
 /// The meshes of the obstacles, and which of them belongs to each frame.

@@ -17,7 +17,7 @@ use rfm::diagnostic::{Code, Diagnostic, Span};
 use rfm::field::Field;
 use rfm::geom::Aabb;
 use rfm::mesh::{Grid, MeshDistance, Resolution, Unwatched, dual_contouring, marching_cubes, thin_cells};
-use rfm::slice::{self, Cut as SolidCut, Panel, Plane, Quantity, Style, Window};
+use rfm::slice::{self, Axis, Cut as SolidCut, Panel, Plane, Quantity, Style, Window};
 use rfm::solid::{Bounds, Chosen};
 use rfm::{Program, Solid};
 
@@ -357,8 +357,20 @@ fn meets(solid: &Solid, plane: Plane, window: Window) -> Option<String> {
         Bounds::Unbounded => "another plane or --window may show it".to_string(),
         Bounds::Within(bounds) => {
             // rounded, because proven bounds are not exact
-            let [low, high] = [bounds.min[axis], bounds.max[axis]].map(|at| (1e5 * at).round() / 1e5 + 0.0);
-            format!("it lies between {0} = {low} and {0} = {high}", plane.axis.name())
+            let rounded = |at: f64| (1e5 * at).round() / 1e5 + 0.0;
+            let between = |axis: Axis| {
+                let [low, high] = [bounds.min, bounds.max].map(|corner| rounded(corner[axis.index()]));
+                format!("{0} = {low} and {0} = {high}", axis.name())
+            };
+            let over = plane.window(bounds);
+            let is_beside = window.max.cmplt(over.min).any() || over.max.cmplt(window.min).any();
+            if is_beside && (bounds.min[axis]..=bounds.max[axis]).contains(&plane.value) {
+                let (right, up) = plane.axis.right_and_up();
+                let [right, up] = [right, up].map(between);
+                format!("the picture shows a place beside it, and it lies between {right}, and between {up}")
+            } else {
+                format!("it lies between {}", between(plane.axis))
+            }
         }
     };
     let corners = [window.min, window.max].map(|corner| plane.point(corner));

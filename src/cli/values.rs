@@ -55,8 +55,20 @@ pub(super) struct Definition {
 
 /// `NAME=VALUE`, the value with or without a unit.
 pub(super) fn definition(text: &str) -> Result<Definition, String> {
-    let (name, value) = text.split_once('=').ok_or("expected NAME=VALUE")?;
-    let (value, dimension) = parse_quantity(value)?;
+    let Some((name, value)) = text.split_once('=') else {
+        let (name, value) = text.split_once([':', ' ']).unwrap_or((text, ""));
+        let (name, value) = (name.trim(), value.trim());
+        let is_value = parse_quantity(value).is_ok();
+        return Err(format!("expected NAME=VALUE, as in {name}={}", if is_value { value } else { "1.2" }));
+    };
+    let (value, dimension) = parse_quantity(value).map_err(|reason| match value.contains(',') {
+        true => format!(
+            "{reason}: decimals have a point, as in 1.2, and several values are those of --sweep {}={}",
+            name.trim(),
+            value.trim()
+        ),
+        false => reason,
+    })?;
     Ok(Definition { name: name.trim().to_string(), value, dimension, place: None })
 }
 
@@ -98,6 +110,23 @@ pub(super) fn threads(text: &str) -> Result<NonZeroUsize, String> {
 pub(super) fn count(text: &str) -> Result<usize, String> {
     let number = text.trim().parse().ok().filter(|&n: &usize| n > 0);
     number.ok_or_else(|| "expected a whole number above 0".to_string())
+}
+
+/// A number of cells along the longest side of a box.
+pub(super) fn cells(text: &str) -> Result<usize, String> {
+    const MOST: f64 = 1e9;
+    let text = text.trim();
+    text.parse().map_err(|_| {
+        let expected = "expected a whole number of cells along the longest side";
+        let first = text.split(['x', '×', ',']).next().unwrap_or_default();
+        match text.parse::<f64>() {
+            Ok(number) if (1.0..=MOST).contains(&number) => format!("{expected}: write {}", number.round()),
+            Err(_) if first != text && first.parse::<usize>().is_ok() => {
+                format!("{expected}, from which the others follow: write {first}")
+            }
+            Ok(_) | Err(_) => format!("{expected}, as in 128"),
+        }
+    })
 }
 
 /// Coordinates in metres or with units, separated by commas.
@@ -167,6 +196,12 @@ pub(super) fn frames(text: &str) -> Result<Frames, String> {
 
 pub(super) fn point(text: &str) -> Result<DVec3, String> {
     numbers::<3>(text).map(DVec3::from_array)
+}
+
+/// A point of space.
+pub(super) fn finite_point(text: &str) -> Result<DVec3, String> {
+    let found = point(text)?;
+    if found.is_finite() { Ok(found) } else { Err("expected three finite lengths".into()) }
 }
 
 /// Three numbers that are not all zero; or what a scene states and the viewer copies:

@@ -50,6 +50,7 @@ mod profiles;
 mod properties;
 mod random;
 mod ranges;
+mod refusals;
 mod render;
 mod reports;
 mod rounding;

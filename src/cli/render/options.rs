@@ -10,7 +10,7 @@ use super::film::{Kind, Target};
 use crate::cli::failure::Failure;
 use crate::cli::scenery::Viewpoint;
 use crate::cli::values::{
-    CutFlag, Frames, camera, count, cut, frames, point, range, seconds, size, times, zoom,
+    CutFlag, Frames, camera, cells, count, cut, frames, point, range, seconds, size, times, zoom,
 };
 use rfm::render::{ColourMap, Material};
 
@@ -126,7 +126,7 @@ pub(in crate::cli) struct Render {
     #[arg(long, help_heading = "Solids", value_name = "TIME", value_parser = seconds, allow_negative_numbers = true)]
     pub time: Option<f64>,
     /// Cells of its mesh along the longest side [default: 128]
-    #[arg(long, help_heading = "Solids", value_name = "N", value_parser = count)]
+    #[arg(long, help_heading = "Solids", value_name = "N", value_parser = cells, allow_negative_numbers = true)]
     pub mesh_cells: Option<usize>,
 }
 

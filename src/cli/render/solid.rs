@@ -6,7 +6,7 @@ use rayon::prelude::*;
 
 use super::film::{Kind, Target};
 use super::options::Render;
-use crate::cli::failure::{Failure, note};
+use crate::cli::failure::{Failure, complain, note};
 use crate::cli::output::{Shown, counted};
 use crate::cli::run::bodies::Bodies;
 use crate::cli::scenery::{self, Drawn, half_towards_eye, opened_by};
@@ -68,6 +68,14 @@ fn picture(shared: &Shared, options: &Render, solid: &Solid, target: &Target) ->
     let bodies = bodies(solid, domain, options);
     let mesh = Mesh::joined(&bodies.meshes_at(options.time.unwrap_or(0.0))?);
     tell_of_thin_parts(&bodies, options)?;
+    if mesh.triangles.is_empty() {
+        complain(&format!(
+            "the picture would be empty, and `{}` is not written: no point of the mesh's grid lies inside `{name}`; more \
+             --mesh-cells find thinner parts",
+            target.path.shown()
+        ));
+        return Err(Failure::Findings);
+    }
     let (camera, drawn) = seen(options, &domain)?;
     let title = title(options, &name, drawn);
     let legend = Legend { title: &title, scale: None };
@@ -199,6 +207,12 @@ fn seen(options: &Render, domain: &Aabb) -> Result<(Camera, Drawn), Failure> {
             ));
         }
     };
+    if let (Drawn::Hidden, Some(CutFlag::Plane(plane))) = (drawn, &options.cut) {
+        return Err(Failure::usage(format!(
+            "--cut {plane}: all of the solid lies between this plane and the eye and is cut away: choose a plane through it, \
+             or a --camera on the other side"
+        )));
+    }
     Ok((camera, drawn))
 }
 

@@ -6,7 +6,7 @@ use clap::Args;
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 
 use crate::cli::sweep::options::{Again, SweepOptions};
-use crate::cli::values::count;
+use crate::cli::values::{cells, count};
 use rfm::sph::Method;
 
 #[derive(Debug, Clone, Args)]
@@ -33,7 +33,7 @@ pub(in crate::cli) struct Report {
     #[arg(long, value_name = "FILE")]
     pub html: Option<PathBuf>,
     /// Cells along the longest side of the finest mesh; the others have half as many each
-    #[arg(long, value_name = "N", default_value_t = 128)]
+    #[arg(long, value_name = "N", default_value_t = 128, value_parser = cells, allow_negative_numbers = true)]
     pub mesh_cells: usize,
     #[command(flatten)]
     pub flow: Flow,

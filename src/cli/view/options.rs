@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
 
-use crate::cli::values::{Frames, count, frames};
+use crate::cli::values::{Frames, cells, count, frames};
 
 /// How a page shows surfaces of the fluid.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
@@ -37,7 +37,7 @@ pub(in crate::cli) struct View {
     #[arg(short, long, value_name = "NAME", conflicts_with = "scene")]
     pub solid: Option<String>,
     /// Cells of the obstacle's mesh along its longest side
-    #[arg(long, value_name = "N", default_value_t = 64)]
+    #[arg(long, value_name = "N", default_value_t = 64, value_parser = cells, allow_negative_numbers = true)]
     pub mesh_cells: usize,
     /// Write one file that shows the run in any browser, and open nothing; - is standard output
     #[arg(long, help_heading = "Runs", value_name = "FILE")]
