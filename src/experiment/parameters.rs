@@ -144,7 +144,8 @@ pub(super) fn slow_sound(scene: &Scene, parameters: &Parameters) -> Option<Diagn
             rounded(sound),
             rounded(speed)
         );
-        Diagnostic::warning(Code::SLOW_SOUND, scene.fluid.shape_span, message)
+        let at = scene.fluid.sound_span.unwrap_or(scene.fluid.shape_span);
+        Diagnostic::warning(Code::SLOW_SOUND, at, message)
             .help(format!("leave `sound_speed` out, or write {} m/s or more", rounded(10.0 * speed)))
     })
 }

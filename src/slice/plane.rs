@@ -75,7 +75,9 @@ impl Plane {
 
 impl fmt::Display for Plane {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{} = {}", self.axis.name(), self.value)
+        // a length in millimetres has digits that only its conversion to metres has made
+        let shown: f64 = format!("{:.12e}", self.value).parse().unwrap_or(self.value);
+        write!(f, "{} = {}", self.axis.name(), shown)
     }
 }
 
@@ -103,6 +105,11 @@ impl Window {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn planes_are_shown_without_digits_of_a_conversion() {
+        assert_eq!(Plane::new(Axis::Z, 99.123_456 * 1e-3).to_string(), "z = 0.099123456");
+    }
 
     #[test]
     fn each_plane_puts_its_own_axis_at_the_value() {

@@ -430,7 +430,9 @@ impl<'t> Slip<'t> {
             "'" | "“" | "”" | "„" | "«" | "‘" => "a text stands in double quotes: `\"…\"`",
             "∪" => "shapes are joined by `or` or `∨`: write `a or b`",
             "∩" => "shapes are cut by `and` or `∧`: write `a and b`",
-            "@" => "an attribute stands before a solid, and its value in brackets, as in `@tolerance(1e-6)`",
+            "@" if self.on_its_line().trim().is_empty() => {
+                "an attribute stands before a solid, and its value in brackets, as in `@tolerance(1e-6)`"
+            }
             "–" | "—" => {
                 "this is a dash: the sign of a difference is `-`, as in `a - b`, and shapes are cut by `a \\ b`"
             }

@@ -396,7 +396,7 @@ fn is_accepted(code: &str) -> bool {
             "box" => text.replace("box { max: [1, 1, 1] }", entries),
             "obstacle" => text.replace("  fluid", &format!("  {entries}\n  fluid")),
             "fluid" => text.replace("fluid { shape: ball([0.5, 0.5, 0.5], 0.2) }", entries),
-            "gravity" | "method" => text.replace("  fluid", &format!("  {entries}\n  fluid")),
+            "gravity" | "method" | "run" => text.replace("  fluid", &format!("  {entries}\n  fluid")),
             "max" => text.replace("max: [1, 1, 1]", entries),
             "dt" | "until" | "save_every" => {
                 text.replace("  fluid", &format!("  run {{ {entries} }}\n  fluid"))

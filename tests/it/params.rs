@@ -61,7 +61,8 @@ fn a_number_that_may_be_in_either_unit_is_asked_about() {
         ("d = 45 deg in 0 deg .. 90 deg", "d=0", false),
         ("d = 2 m in 1 .. 3", "d=3", false),
     ] {
-        let text = format!("rfm 1\nparam {param}\nsolid s = sphere(1).move([d, 0, 0])\n");
+        let moved = if param.contains("deg") { "rotate_z(d)" } else { "move([d, 0, 0])" };
+        let text = format!("rfm 1\nparam {param}\nsolid s = box().{moved}\n");
         std::fs::write(folder.path().join("a.rfm"), text).unwrap();
         let found =
             rfm(folder.path(), &["check", "a.rfm", "--budget", "100ms", "-D", given]).expect(0).stderr;

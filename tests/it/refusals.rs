@@ -80,6 +80,12 @@ fn the_folder_of_a_sweep_leads_to_its_runs() {
     let scene = "param h = 0.5\nscene s {\n  box { max: [1, 1, 1] }\n  fluid w { shape: ball([0.5, 0.5, h], 0.2), particles: 50 }\n  \
                  run { until: 1 ms }\n}";
     let folder = folder(&[("a.rfm", scene)]);
+    let refused = rfm(folder.path(), &["run", "a.rfm", "--no-pictures", "-o", "a.rfm"]).expect(2);
+    assert!(
+        refused.stderr.contains("`a.rfm` is a file, and a run writes into a folder"),
+        "{}",
+        refused.stderr
+    );
     let run = ["run", "a.rfm", "--sweep", "h=0.4,0.5", "--no-pictures", "--threads", "1", "-o", "out"];
     rfm(folder.path(), &run).expect(0);
     for arguments in [&["render", "out", "-o", "a.gif"][..], &["view", "out", "--save", "a.html"]] {

@@ -142,6 +142,12 @@ pub(super) fn run_in(folder: &Path) -> Option<String> {
 impl Hold {
     /// Makes the folder if it is not there, and locks it. Removes the temporary files of a run that was killed.
     pub fn take(folder: &Path) -> Result<Self, Failure> {
+        if folder.is_file() {
+            return Err(Failure::usage(format!(
+                "`{}` is a file, and a run writes into a folder: name one with -o DIR",
+                folder.shown()
+            )));
+        }
         std::fs::create_dir_all(folder)
             .map_err(|e| Failure::usage(format!("cannot make the folder `{}`: {e}", folder.shown())))?;
         let path = folder.join(LOCK);

@@ -9,6 +9,9 @@ impl Lowering<'_> {
     /// The message for `box(center=[0, 0, 0], size=[1, 1, 1])` and `cylinder(h=2, r1=1, r2=0.5)`; `None` if the
     /// arguments are those of this language, or unknown.
     pub fn solid_of_other_tools(&self, function: &str, arguments: &[Argument]) -> Option<Diagnostic> {
+        if let Some(diagnostic) = self.centred_solid(function, arguments) {
+            return Some(diagnostic);
+        }
         let mut given = Given { lowering: self, unread: arguments.iter().collect() };
         let (known, call): (&[&str], _) = match function {
             "box" => (&BOX, given.box_of_a_size()),
@@ -33,6 +36,32 @@ impl Lowering<'_> {
             None => format!("{what}: write for example `{generic}`"),
         };
         Some(Diagnostic::error(Code::ARGUMENTS, first.span, message).help(help))
+    }
+
+    /// The message for `cylinder(1, 2, center=true)`; `None` if the arguments are others than a radius, a height and this.
+    fn centred_solid(&self, function: &str, arguments: &[Argument]) -> Option<Diagnostic> {
+        if !["cylinder", "cone", "capsule"].contains(&function) {
+            return None;
+        }
+        let name = arguments.iter().filter_map(|argument| argument.name.as_ref());
+        let name = name.into_iter().find(|name| CENTRE.contains(&name.text.as_str()))?;
+        let mut given = Given { lowering: self, unread: arguments.iter().collect() };
+        let centre = given.named(&CENTRE)?;
+        let is_centred = match given.written(centre)? {
+            "true" | "True" => true,
+            "false" | "False" => false,
+            _ => return None,
+        };
+        let r = given.named(&["r", "radius"]).or_else(|| given.unnamed())?;
+        let h = given.named(&["h", "height"]).or_else(|| given.unnamed())?;
+        let (r, h) = (given.written(r)?, given.written(h)?);
+        if !given.unread.is_empty() {
+            return None;
+        }
+        let lowered = if is_centred { format!(".move([0, 0, {}])", times(-0.5, h)) } else { String::new() };
+        let message = format!("`{function}` has no parameter `{}`", name.text);
+        let help = format!("a {function} begins at z = 0: write `{function}({r}, {h}){lowered}`");
+        Some(Diagnostic::error(Code::ARGUMENTS, name.span, message).help(help))
     }
 }
 

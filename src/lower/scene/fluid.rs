@@ -229,6 +229,7 @@ impl<'a> Lowering<'a> {
             viscosity: viscosity?,
             surface_tension: tension?,
             tension_span: block.setting(keys::SURFACE_TENSION.name).map(|(_, value)| value.span),
+            sound_span: block.setting("sound_speed").map(|(_, value)| value.span),
             support_radius,
             viscosity_span: stated_at(&keys::VISCOSITY).or(stated_at(&keys::DENSITY)),
             support_span: stated_at(&keys::SUPPORT_RADIUS),
@@ -262,7 +263,7 @@ impl<'a> Lowering<'a> {
             );
         }
         if let (Some(density), Some((_, value))) = (density, block.setting(keys::DENSITY.name))
-            && (0.0..LEAST_DENSITY).contains(&density)
+            && (LEAST_DENSITY..1000.0 * LEAST_DENSITY).contains(&(1000.0 * density))
             && self.is_bare(value)
         {
             let message = format!("a fluid of {} kg/m³ is lighter than any liquid", significant(density));

@@ -152,6 +152,15 @@ fn of_other_methods(key: &str, entries: &[Entry], declared: &[SceneKey]) -> Vec<
     if methods.contains(&own) || declared.iter().any(has_key) { Vec::new() } else { methods }
 }
 
+/// The key that a word of other programs, or of another block, stands for in a block.
+fn own_key(block: &str, word: &str) -> Option<&'static str> {
+    match (block, word) {
+        // an obstacle has a solid, a fluid a shape
+        ("a fluid", "solid") => Some("shape"),
+        _ => foreign::key(word),
+    }
+}
+
 /// Names in a sentence: `a`, `b` and `c`.
 fn listed(names: &[&str]) -> String {
     let quoted: Vec<String> = names.iter().map(|name| format!("`{name}`")).collect();
@@ -171,7 +180,7 @@ impl<'a> Lowering<'a> {
     /// Reports that a block lacks a key that it needs.
     pub(in crate::lower) fn missing(&mut self, block: &Block<'_>, key: &str, help: &str) {
         // in the wrong form, or by another name, which was reported
-        let is_it = |text: &str| text == key || foreign::key(text) == Some(key);
+        let is_it = |text: &str| text == key || own_key(block.what, text) == Some(key);
         if block.entries.iter().any(|entry| is_it(&entry.key().text)) {
             return;
         }
@@ -230,11 +239,7 @@ impl<'a> Lowering<'a> {
                 let diagnostic = Diagnostic::error(Code::SCENE_KEY, key.span, message)
                     .help(format!("its keys are {}", known.join(", ")))
                     .suggest(&key.text, known.iter().copied());
-                let own = match (what, key.text.as_str()) {
-                    // an obstacle has a solid, a fluid a shape
-                    ("a fluid", "solid") => Some("shape"),
-                    (_, word) => foreign::key(word),
-                };
+                let own = own_key(what, &key.text);
                 // a word of other programs may be a key of a block here
                 let literal = blocks_with(&key.text, declared);
                 let own = own.filter(|_| literal.is_empty());

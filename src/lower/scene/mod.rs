@@ -173,6 +173,8 @@ pub struct Fluid {
     pub surface_tension: f64,
     /// Place of its value; `None` if it is the method's.
     pub tension_span: Option<Span>,
+    /// Place of the stated speed of sound, which only some methods have.
+    pub sound_span: Option<Span>,
     /// Place of the viscosity in the text or, if that is the method's, of the density by which it is divided.
     pub viscosity_span: Option<Span>,
     /// Place of the support radius in the text, if it is stated.

@@ -15,6 +15,16 @@ const PROPOSED: &[(&str, &str, &str)] = &[
         "any i in [0..6]: sphere(0.1).move([i, 0, 0])",
         "any i in 0..6: sphere(0.1).move([i, 0, 0])",
     ),
+    (
+        "solid s = cylinder(1, 2, center=true)",
+        "cylinder(1, 2, center=true)",
+        "cylinder(1, 2).move([0, 0, -1])",
+    ),
+    (
+        "solid s = cylinder(h=4 mm, r=1 mm, center=false)",
+        "cylinder(h=4 mm, r=1 mm, center=false)",
+        "cylinder(1 mm, 4 mm)",
+    ),
     ("solid s = sin x <= y and sphere(1)", "sin x", "sin(x)"),
     ("solid s = z <= abs sin(x) and sphere(1)", "abs sin(x)", "abs(sin(x))"),
     (
