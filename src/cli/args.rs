@@ -13,8 +13,8 @@ use super::shared::Shared;
 use super::sweep::options::{Again, SweepOptions};
 pub(super) use super::values::CutFlag;
 use super::values::{
-    Deny, Frames, Tolerance, aabb, camera, cells, cut, deny, finite_point, frames, length, plane, seconds,
-    steps, tolerance, window,
+    Deny, Frames, Tolerance, aabb, camera, cells, cut, deny, frames, length, plane, point, seconds, steps,
+    tolerance, window,
 };
 use glam::DVec3;
 use rfm::geom::Aabb;
@@ -180,7 +180,7 @@ pub(super) struct Eval {
     #[arg(short, long, value_name = "NAME")]
     pub solid: Option<String>,
     /// A point; may be repeated
-    #[arg(long, value_name = "X,Y,Z", value_parser = finite_point, allow_hyphen_values = true)]
+    #[arg(long, value_name = "X,Y,Z", value_parser = point, allow_hyphen_values = true)]
     pub at: Vec<DVec3>,
     /// A CSV file of points with the header x,y,z; `-` is standard input
     #[arg(long, value_name = "FILE")]

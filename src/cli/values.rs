@@ -198,12 +198,6 @@ pub(super) fn point(text: &str) -> Result<DVec3, String> {
     numbers::<3>(text).map(DVec3::from_array)
 }
 
-/// A point of space.
-pub(super) fn finite_point(text: &str) -> Result<DVec3, String> {
-    let found = point(text)?;
-    if found.is_finite() { Ok(found) } else { Err("expected three finite lengths".into()) }
-}
-
 /// Three numbers that are not all zero; or what a scene states and the viewer copies:
 /// `picture { camera: [0.5, -1, 0.4], look_at: [1, 1, 0.5], zoom: 2, projection: parallel }`.
 pub(super) fn camera(text: &str) -> Result<Viewpoint, String> {
