@@ -160,7 +160,7 @@ mod tests {
 
     #[test]
     fn long_numbers_leave_room_for_the_name_of_their_axis() {
-        for (low, side) in [(0.0, 1.0), (19.999, 2e-3), (5e6, 10.0), (1999.999_999, 2e-6), (-5e6, 0.01)] {
+        for (low, side) in [(0.0, 1.0), (19.999, 2e-3), (5e6, 10.0), (1_999.999_999, 2e-6), (-5e6, 0.01)] {
             let window = Window::new(DVec2::splat(low), DVec2::splat(low + side));
             let frame = PlotFrame::with_room(window, DVec2::new(72.0, 44.0));
             let mut out = String::new();
