@@ -2,8 +2,8 @@
 //!
 //! A particle keeps half a spacing from walls, so the wedge below a cylinder that lies on a floor stays empty
 //! over √(2Rs) of its way. The load that is missing there is found from points on the surface: those in the
-//! fluid's shape that have no particle near, each weighted by its depth. Scenes so large that there are too
-//! many points are not looked at.
+//! fluid's shape beside which no particle has room, or near which there is none at the start, each weighted by its
+//! depth. Scenes so large that there are too many points are not looked at.
 
 use glam::DVec3;
 use rustc_hash::FxHashMap;
@@ -11,13 +11,18 @@ use rustc_hash::FxHashMap;
 use super::{Body, Experiment};
 use crate::Solid;
 use crate::diagnostic::{Code, Diagnostic};
-use crate::geom::Aabb;
+use crate::geom::{Aabb, significant};
 use crate::lower::Gravity;
 use crate::sph::Particles;
 
 /// A point has a particle near if one is within this distance, in spacings. On plain walls a lattice that
 /// does not fit them leaves 1.5 spacings, and in their corners 1.7.
 const NEAR: f64 = 2.0;
+
+/// A particle has room where everything within this distance is free, and is beside a wall up to that distance from it, in
+/// spacings. In an edge of 60° the nearest place with room is one spacing away.
+const ROOM: f64 = 0.5;
+const BESIDE: f64 = 1.25;
 
 /// Missing loads above this part get a warning.
 const MUCH: f64 = 0.02;
@@ -50,24 +55,36 @@ impl Experiment {
     }
 
     fn dry_wall(&self, body: &Body, load: &dyn Fn(DVec3) -> f64, near: &Near<'_>) -> Option<Diagnostic> {
-        let (mut all, mut missing) = (0.0, 0.0);
+        let mut surroundings = Surroundings::of(self, body)?;
+        let (mut all, mut missing, mut force) = (0.0, 0.0, DVec3::ZERO);
         let mut deepest = (0.0, DVec3::ZERO);
-        self.visit_wetted(body, |at| {
+        for n in 0..surroundings.inside.len() {
+            let Some(area) = surroundings.area(n) else { continue };
+            let at = surroundings.lattice.at(n);
             let load = load(at);
             all += load;
-            if !near.has(at) {
+            if !near.has(at) || !surroundings.has_room_near(n) {
                 missing += load;
+                force += load * area;
                 if load > deepest.0 {
                     deepest = (load, at);
                 }
             }
-        });
+        }
         let part = missing / all;
         (part > MUCH).then(|| {
             let spacing = self.parameters.spacing();
+            let newtons = match &self.scene.gravity {
+                Gravity::Still(gravity) => self.scene.fluid.density * gravity.length() * force.length(),
+                Gravity::Turning(_) | Gravity::Field(_) => 0.0,
+            };
+            let newtons = match newtons > 0.0 {
+                true => format!(", which pushes it with {} N,", significant(newtons)),
+                false => String::new(),
+            };
             let message = format!(
                 "no particle finds room beside `{}` at {}, where the fluid's shape is: at least {:.0} % of the load of a \
-                 fluid at rest is missing there",
+                 fluid at rest{newtons} is missing there",
                 body.solid.name(),
                 place(deepest.1, spacing),
                 100.0 * part
@@ -76,71 +93,116 @@ impl Experiment {
                 .help("a smaller spacing leaves less: a quarter of it leaves half where walls touch, and a quarter in a wedge")
         })
     }
+}
 
-    /// Visits points of a lattice that lie in the fluid's shape and outside all bodies, next to one that lies
-    /// in `body`.
-    fn visit_wetted(&self, body: &Body, mut visit: impl FnMut(DVec3)) {
-        let spacing = self.parameters.spacing();
-        let Some(shape) = self.fluid.bounds().aabb() else { return };
-        let of_body = body.solid.bounds().aabb().map_or(self.scene.domain, |bounds| bounds.grown(spacing));
-        let region = shape.intersection(&self.scene.domain).intersection(&of_body);
-        let size = region.size();
-        if size.cmple(DVec3::ZERO).any() {
-            return;
+/// What lies at the points of a lattice around a body.
+struct Surroundings {
+    lattice: Lattice,
+    /// In the body.
+    inside: Vec<bool>,
+    /// In the box, and outside all bodies.
+    free: Vec<bool>,
+    /// Free, and in the fluid's shape.
+    wet: Vec<bool>,
+    /// Whether a particle has room at a free point, where that was asked.
+    room: Vec<Option<bool>>,
+    /// From a point to those that must be free where a particle has room, and to those at which one is beside it.
+    of_particle: Vec<[i64; 3]>,
+    beside: Vec<[i64; 3]>,
+}
+
+impl Surroundings {
+    /// The surroundings of a body; `None` if the fluid's shape does not meet it, or if there would be too many points.
+    fn of(experiment: &Experiment, body: &Body) -> Option<Self> {
+        let (spacing, domain) = (experiment.parameters.spacing(), experiment.scene.domain);
+        let shape = experiment.fluid.bounds().aabb().unwrap_or(domain);
+        let of_body = body.solid.bounds().aabb().map_or(domain, |bounds| bounds.grown(spacing));
+        let region = shape.intersection(&domain).intersection(&of_body);
+        if region.size().cmple(DVec3::ZERO).any() {
+            return None;
         }
-        let counts = |step: f64| (size / (step * spacing)).ceil().max(DVec3::ONE);
-        let few = STEPS.into_iter().map(counts).find(|counts| counts.element_product() <= MOST_POINTS);
-        let Some(counts) = few else { return };
-        let lattice = Lattice { region, counts };
+        let region = region.grown((BESIDE + ROOM) * spacing);
+        let lattice_of =
+            |step: f64| Lattice { region, counts: (region.size() / (step * spacing)).ceil().max(DVec3::ONE) };
+        let few = |step: &f64| lattice_of(*step).counts.element_product() <= MOST_POINTS;
+        let step = STEPS.into_iter().find(few)?;
+        let lattice = lattice_of(step);
         let meets = |other: &&Body| {
-            let bounds = other.solid.bounds().aabb().unwrap_or(self.scene.domain);
+            let bounds = other.solid.bounds().aabb().unwrap_or(domain);
             !std::ptr::eq(*other, body) && bounds.intersection(&region).size().cmpge(DVec3::ZERO).all()
         };
-        let others: Vec<&Body> = self.bodies.iter().filter(meets).collect();
-        let mut planes: [Plane; 3] = Default::default();
-        let [nx, ny, nz] = lattice.counts.to_array().map(|n| n as usize);
-        for k in 0..=nz {
-            planes.rotate_left(1);
-            planes[2] = if k < nz { self.plane(body, &others, &lattice, k) } else { Plane::default() };
-            if k == 0 {
-                continue;
+        let others: Vec<&Body> = experiment.bodies.iter().filter(meets).collect();
+        let (mut inside, mut free, mut wet) = (Vec::new(), Vec::new(), Vec::new());
+        for k in 0..lattice.counts.z as usize {
+            let [x, y, z] = lattice.plane(k);
+            let mut sign = vec![0.0; x.len()];
+            let mut holds = |solid: &Solid| -> Vec<bool> {
+                solid.sign_many([&x, &y, &z], &mut sign);
+                sign.iter().map(|sign| *sign >= 0.0).collect()
+            };
+            let in_body = holds(&body.solid);
+            let mut is_free: Vec<bool> =
+                (0..x.len()).map(|n| !in_body[n] && domain.contains(DVec3::new(x[n], y[n], z[n]))).collect();
+            for other in &others {
+                let covered = holds(&other.solid);
+                is_free.iter_mut().zip(covered).for_each(|(free, covered)| *free &= !covered);
             }
-            let [below, own, above] = &planes;
-            let inside = |plane: &Plane, n: usize| plane.inside.get(n) == Some(&true);
-            for n in (0..nx * ny).filter(|n| own.wet[*n]) {
-                let (i, j) = (n % nx, n / nx);
-                let beside = [
-                    (i > 0, n.wrapping_sub(1)),
-                    (i + 1 < nx, n + 1),
-                    (j > 0, n.wrapping_sub(nx)),
-                    (j + 1 < ny, n + nx),
-                ];
-                if beside.into_iter().any(|(is_there, n)| is_there && own.inside[n])
-                    || inside(below, n)
-                    || inside(above, n)
-                {
-                    visit(lattice.at(i, j, k - 1));
+            let in_shape = holds(&experiment.fluid);
+            wet.extend(in_shape.iter().zip(&is_free).map(|(wet, free)| *wet && *free));
+            inside.extend(in_body);
+            free.extend(is_free);
+        }
+        let room = vec![None; free.len()];
+        let [of_particle, beside] = [ROOM, BESIDE].map(|radius| ball(radius / step));
+        Some(Self { lattice, inside, free, wet, room, of_particle, beside })
+    }
+
+    /// The faces between a wet point and the body, m², as a vector into the body; `None` if there are none.
+    fn area(&self, n: usize) -> Option<DVec3> {
+        if !self.wet[n] {
+            return None;
+        }
+        let (mut area, mut is_beside) = (DVec3::ZERO, false);
+        let cell = self.lattice.region.size() / self.lattice.counts;
+        for axis in 0..3 {
+            for way in [-1, 1] {
+                let mut step = [0; 3];
+                step[axis] = way;
+                if self.lattice.beside(n, step).is_some_and(|other| self.inside[other]) {
+                    is_beside = true;
+                    area[axis] += way as f64 * cell.element_product() / cell[axis];
                 }
             }
         }
+        is_beside.then_some(area)
     }
 
-    /// Classifies the points of a plane of the lattice. `others` are the other bodies in the lattice's box.
-    fn plane(&self, body: &Body, others: &[&Body], lattice: &Lattice, k: usize) -> Plane {
-        let [x, y, z] = lattice.plane(k);
-        let mut sign = vec![0.0; x.len()];
-        let mut holds = |solid: &Solid| -> Vec<bool> {
-            solid.sign_many([&x, &y, &z], &mut sign);
-            sign.iter().map(|sign| *sign >= 0.0).collect()
-        };
-        let (inside, mut wet) = (holds(&body.solid), holds(&self.fluid));
-        wet.iter_mut().zip(&inside).for_each(|(wet, inside)| *wet &= !inside);
-        for other in others {
-            let covered = holds(&other.solid);
-            wet.iter_mut().zip(covered).for_each(|(wet, covered)| *wet &= !covered);
-        }
-        Plane { inside, wet }
+    /// Whether a particle has room so near to a point that it is beside it.
+    fn has_room_near(&mut self, n: usize) -> bool {
+        (0..self.beside.len()).any(|k| {
+            self.lattice
+                .beside(n, self.beside[k])
+                .is_some_and(|other| self.free[other] && self.has_room(other))
+        })
     }
+
+    fn has_room(&mut self, n: usize) -> bool {
+        let Self { lattice, free, of_particle, .. } = self;
+        *self.room[n].get_or_insert_with(|| {
+            of_particle.iter().all(|step| lattice.beside(n, *step).is_none_or(|other| free[other]))
+        })
+    }
+}
+
+/// The steps to all points within a distance, in units of the lattice, the shortest first.
+fn ball(radius: f64) -> Vec<[i64; 3]> {
+    let most = radius.floor() as i64;
+    let of = |step: &[i64; 3]| step.iter().map(|n| n * n).sum::<i64>();
+    let sides = || -most..=most;
+    let all = sides().flat_map(|x| sides().flat_map(move |y| sides().map(move |z| [x, y, z])));
+    let mut steps: Vec<[i64; 3]> = all.filter(|step| of(step) as f64 <= radius * radius).collect();
+    steps.sort_by_key(of);
+    steps
 }
 
 /// Points in the middles of equal cells that fill a box.
@@ -151,28 +213,38 @@ struct Lattice {
 }
 
 impl Lattice {
-    fn at(&self, i: usize, j: usize, k: usize) -> DVec3 {
-        let index = DVec3::new(i as f64, j as f64, k as f64) + 0.5;
+    fn sides(&self) -> [usize; 3] {
+        self.counts.to_array().map(|n| n as usize)
+    }
+
+    fn at(&self, n: usize) -> DVec3 {
+        let [nx, ny, _] = self.sides();
+        let index = DVec3::new((n % nx) as f64, (n / nx % ny) as f64, (n / (nx * ny)) as f64) + 0.5;
         self.region.min + self.region.size() / self.counts * index
+    }
+
+    /// The point that lies so many steps from another one; `None` beyond the border.
+    fn beside(&self, n: usize, step: [i64; 3]) -> Option<usize> {
+        let [nx, ny, nz] = self.sides();
+        let at = [n % nx, n / nx % ny, n / (nx * ny)];
+        let mut there = [0; 3];
+        for axis in 0..3 {
+            there[axis] = at[axis].checked_add_signed(step[axis] as isize)?;
+        }
+        let [i, j, k] = there;
+        (i < nx && j < ny && k < nz).then_some(i + nx * (j + ny * k))
     }
 
     /// The points of a plane across z, as columns.
     fn plane(&self, k: usize) -> [Vec<f64>; 3] {
-        let [nx, ny, _] = self.counts.to_array().map(|n| n as usize);
-        let points = (0..nx * ny).map(|n| self.at(n % nx, n / nx, k));
+        let [nx, ny, _] = self.sides();
+        let points = (0..nx * ny).map(|n| self.at(n + nx * ny * k));
         let mut columns: [Vec<f64>; 3] = Default::default();
         for at in points {
             columns.iter_mut().zip(at.to_array()).for_each(|(column, x)| column.push(x));
         }
         columns
     }
-}
-
-/// The points of a plane: those in the body, and those in the fluid's shape and outside all bodies.
-#[derive(Default)]
-struct Plane {
-    inside: Vec<bool>,
-    wet: Vec<bool>,
 }
 
 /// The particles by cells that are as wide as a particle is near.

@@ -7,6 +7,8 @@ use std::ptr::{null, null_mut};
 
 use library::diagnostic::{Diagnostics, Severity};
 
+use super::environment::Hosts;
+
 /// How a function ended.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -130,6 +132,7 @@ impl From<library::Error> for RfmError {
 /// `error` is null or may be written to.
 // SAFETY: the caller promises what the one write needs
 pub unsafe fn attempt(error: *mut *mut RfmError, work: impl FnOnce() -> Result<(), RfmError>) -> RfmStatus {
+    let _hosts = Hosts::leave();
     let result =
         catch_unwind(AssertUnwindSafe(work)).unwrap_or_else(|cause| Err(RfmError::panicked(&*cause)));
     let (status, object) = match result {
@@ -149,6 +152,7 @@ pub unsafe fn attempt(error: *mut *mut RfmError, work: impl FnOnce() -> Result<(
 /// Runs a function that answers with numbers; after a panic the answer is `otherwise`.
 #[inline]
 pub fn answer<R>(otherwise: R, work: impl FnOnce() -> R) -> R {
+    let _hosts = Hosts::leave();
     catch_unwind(AssertUnwindSafe(work)).unwrap_or(otherwise)
 }
 

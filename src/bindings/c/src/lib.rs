@@ -3,6 +3,7 @@
 //! | file | what it has |
 //! |---|---|
 //! | `error` | statuses and error objects, and how a panic becomes one |
+//! | `environment` | floating-point exceptions and rounding of the host |
 //! | `program` | files and texts, checked |
 //! | `solid` | solids, and questions about one point |
 //! | `columns` | questions about many points, and collisions |
@@ -15,6 +16,7 @@
 #![allow(non_camel_case_types)]
 
 mod columns;
+mod environment;
 mod error;
 mod mathematics;
 mod program;

@@ -6,10 +6,9 @@ use std::process::ExitCode;
 fn main() -> Result<ExitCode, Box<dyn std::error::Error>> {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
     let config = cbindgen::Config::from_file(folder.join("cbindgen.toml"))?;
-    let mut builder = cbindgen::Builder::new().with_config(config);
-    for file in ["lib", "error", "program", "solid", "columns", "mathematics"] {
-        builder = builder.with_src(folder.join("src").join(file).with_extension("rs"));
-    }
+    // the modules that it names are read with it
+    let library = folder.join("src/lib.rs");
+    let builder = cbindgen::Builder::new().with_config(config).with_src(library);
     let mut header = Vec::new();
     builder.generate()?.write(&mut header);
     let path = folder.join("include/rfm.h");
