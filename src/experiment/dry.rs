@@ -11,7 +11,7 @@ use rustc_hash::FxHashMap;
 use super::{Body, Experiment};
 use crate::Solid;
 use crate::diagnostic::{Code, Diagnostic};
-use crate::geom::{Aabb, significant};
+use crate::geom::Aabb;
 use crate::lower::Gravity;
 use crate::sph::Particles;
 
@@ -19,16 +19,19 @@ use crate::sph::Particles;
 /// does not fit them leaves 1.5 spacings, and in their corners 1.7.
 const NEAR: f64 = 2.0;
 
-/// A particle has room where everything within this distance is free, and is beside a wall up to that distance from it, in
+/// A particle has room where everything nearer than this is free, and is beside a wall up to that distance from it, in
 /// spacings. In an edge of 60° the nearest place with room is one spacing away.
 const ROOM: f64 = 0.5;
 const BESIDE: f64 = 1.25;
+
+/// Squares of whole numbers that differ by less than this are the same.
+const ROUNDING: f64 = 1e-6;
 
 /// Missing loads above this part get a warning.
 const MUCH: f64 = 0.02;
 
 /// Distances between points, in spacings: the first for which there are not too many.
-const STEPS: [f64; 2] = [0.25, 0.5];
+const STEPS: [f64; 2] = [1.0 / 6.0, 0.5];
 
 /// The most points that are looked at.
 const MOST_POINTS: f64 = 2e7;
@@ -79,7 +82,7 @@ impl Experiment {
                 Gravity::Turning(_) | Gravity::Field(_) => 0.0,
             };
             let newtons = match newtons > 0.0 {
-                true => format!(", which pushes it with {} N,", significant(newtons)),
+                true => format!(", which pushes it with {} N,", rounded(newtons)),
                 false => String::new(),
             };
             let message = format!(
@@ -153,7 +156,10 @@ impl Surroundings {
             free.extend(is_free);
         }
         let room = vec![None; free.len()];
-        let [of_particle, beside] = [ROOM, BESIDE].map(|radius| ball(radius / step));
+        let beside = ball(BESIDE / step);
+        // a place with room lies between points, too, so that one at the very distance may be a wall
+        let nearer = |step_to: &[i64; 3]| length_squared(step_to) < (ROOM / step).powi(2) - ROUNDING;
+        let of_particle = beside.iter().copied().filter(nearer).collect();
         Some(Self { lattice, inside, free, wet, room, of_particle, beside })
     }
 
@@ -197,12 +203,15 @@ impl Surroundings {
 /// The steps to all points within a distance, in units of the lattice, the shortest first.
 fn ball(radius: f64) -> Vec<[i64; 3]> {
     let most = radius.floor() as i64;
-    let of = |step: &[i64; 3]| step.iter().map(|n| n * n).sum::<i64>();
     let sides = || -most..=most;
     let all = sides().flat_map(|x| sides().flat_map(move |y| sides().map(move |z| [x, y, z])));
-    let mut steps: Vec<[i64; 3]> = all.filter(|step| of(step) as f64 <= radius * radius).collect();
-    steps.sort_by_key(of);
+    let mut steps: Vec<[i64; 3]> = all.filter(|step| length_squared(step) <= radius * radius).collect();
+    steps.sort_by(|a, b| length_squared(a).total_cmp(&length_squared(b)));
     steps
+}
+
+fn length_squared(step: &[i64; 3]) -> f64 {
+    step.iter().map(|n| n * n).sum::<i64>() as f64
 }
 
 /// Points in the middles of equal cells that fill a box.
@@ -272,6 +281,11 @@ impl<'a> Near<'a> {
             |i: &u32| self.particles.position.get(*i as usize).distance_squared(at) <= self.width.powi(2);
         beside.filter_map(|cell| self.cells.get(&cell)).any(|cell| cell.iter().any(near))
     }
+}
+
+/// A number with two digits.
+fn rounded(number: f64) -> f64 {
+    format!("{number:.1e}").parse().unwrap_or(number)
 }
 
 /// A place with digits fine enough to show tenths of the spacing.

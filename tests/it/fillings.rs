@@ -381,3 +381,27 @@ scene rest {{
     assert_eq!(said("box([0.613, -1, -1], [0.8, 1, 1])", "spacing: 0.02"), None);
     assert_eq!(said(roll, "spacing: 0.02, particles: 500, fill: middle"), None);
 }
+
+/// A ball of four spacings that lies on a floor, in a shape without ends: below it particles find room up to √(2Rs) from
+/// where it touches, and the water there would lift it with half of its weight in water.
+#[test]
+fn a_ball_on_a_floor_lacks_the_load_below_it() {
+    let text = "rfm 1
+solid body = sphere(0.1, [0.25, 0.25, 0.1])
+scene rest {
+  box { max: [0.5, 0.5, 0.5] }
+  obstacle { solid: body }
+  fluid water { shape: z <= 0.3, density: 1000, spacing: 0.025 }
+  run { until: 1 s }
+}";
+    let program = Program::from_source("rest.rfm", text).unwrap_or_else(|e| panic!("{e}"));
+    let experiment = Experiment::new(&program, "rest", Engine::Auto).unwrap_or_else(|e| panic!("{e}"));
+    let start = experiment.start().unwrap_or_else(|e| panic!("{e}"));
+    let dry = start.warnings.list.into_iter().find(|warning| warning.code.0 == "W0518").expect("a warning");
+    let (_, after) = dry.message.split_once("pushes it with ").expect(&dry.message);
+    let newtons: f64 = after.split(' ').next().unwrap().parse().expect(after);
+    println!("{}", dry.message);
+    // between the disc that no particle touches, 1.6 spacings in radius, and the one in which none has its middle, 2.8
+    let pressed = |radius: f64| 2943.0 * std::f64::consts::PI * radius.powi(2);
+    assert!(newtons > pressed(1.6 * 0.025) && newtons < pressed(2.8 * 0.025), "{newtons} N");
+}

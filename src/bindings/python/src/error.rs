@@ -1,10 +1,11 @@
 //! What the module raises: `RfmError` for all that is wrong with a file, a solid or a scene, and `OSError` for
 //! files that cannot be read or written.
 
+use std::ffi::CString;
 use std::fmt::Display;
 use std::io;
 
-use pyo3::exceptions::{PyOSError, PyValueError};
+use pyo3::exceptions::{PyOSError, PyUserWarning, PyValueError};
 use pyo3::prelude::*;
 use pyo3::sync::PyOnceLock;
 use pyo3::types::{PyTuple, PyType};
@@ -87,4 +88,10 @@ pub fn diagnostics<'py>(py: Python<'py>, found: &Diagnostics) -> PyResult<Bound<
         })
         .collect::<PyResult<_>>()?;
     PyTuple::new(py, list)
+}
+
+/// Shows a warning at the line that called.
+pub fn warn(py: Python<'_>, text: &str) -> PyResult<()> {
+    let message = CString::new(text).map_err(refused)?;
+    PyErr::warn(py, &py.get_type::<PyUserWarning>(), &message, 1)
 }

@@ -38,24 +38,59 @@ pub fn mesher(method: &str) -> PyResult<Mesher> {
     }
 }
 
-/// The volume of a solid, m³: on meshes with so many cells along the longest side, or along lines if it is too thin
-/// for any of them.
+/// A volume, m³, and what is doubtful about it.
+pub struct Measured {
+    pub volume: f64,
+    pub doubt: Option<String>,
+}
+
+impl Measured {
+    fn certain(volume: f64) -> Self {
+        Self { volume, doubt: None }
+    }
+}
+
+/// An error of a volume above this part of it is told.
+const LARGE_ERROR: f64 = 0.01;
+
+/// The volume of a solid: on meshes with so many cells along the longest side, or along lines if parts of it are too thin
+/// for them.
 ///
 /// # Errors
 /// `RfmError` if no box around the solid is known, if it cannot be meshed, or if neither meshes nor lines show it.
-pub fn volume(solid: &Solid, cells: usize, watch: &Watch) -> PyResult<f64> {
+pub fn volume(solid: &Solid, cells: usize, watch: &Watch) -> PyResult<Measured> {
     let bounds = match solid.bounds() {
         Bounds::Within(bounds) => bounds,
-        Bounds::Empty => return Ok(0.0),
+        Bounds::Empty => return Ok(Measured::certain(0.0)),
         Bounds::Unbounded => return Err(refused(unbounded(solid))),
     };
     let surface = solid.surface(bounds.grown(0.1 * bounds.size().max_element()));
-    match mesh::volume(&*surface, bounds, cells, watch) {
-        Ok(found) => Ok(found.volume),
-        Err(error @ VolumeError::TooThin) => {
-            mesh::by_lines(&*surface, bounds, watch).map(|found| found.volume).ok_or_else(|| refused(error))
+    let by_mesh = match mesh::volume(&*surface, bounds, cells, watch) {
+        Ok(found) => Some(found.volume),
+        Err(VolumeError::TooThin) => None,
+        Err(error) => return Err(refused(error)),
+    };
+    if let Some(volume) = by_mesh {
+        let grid = Grid::around(bounds, Resolution::Cells(cells)).map_err(refused)?;
+        let thin = mesh::thin_cells(&*surface, &grid, watch).map_err(refused)?;
+        if thin.is_wedge || thin.count == 0 && !thin.ended {
+            return Ok(Measured::certain(volume));
         }
-        Err(error) => Err(refused(error)),
+    }
+    match (mesh::by_lines(&*surface, bounds, watch), by_mesh) {
+        (Some(found), _) => {
+            let error = found.error / found.volume;
+            let doubt = (error > LARGE_ERROR).then(|| {
+                format!("parts of the solid are too thin for {cells} cells, so its volume is known to {:.0} % only", 100.0 * error)
+            });
+            Ok(Measured { volume: found.volume, doubt })
+        }
+        (None, Some(volume)) => {
+            let doubt =
+                format!("parts of the solid are too thin for {cells} cells, and its volume is without them");
+            Ok(Measured { volume, doubt: Some(doubt) })
+        }
+        (None, None) => Err(refused(VolumeError::TooThin)),
     }
 }
 

@@ -14,6 +14,7 @@ use rfm::{Solid, mesh};
 use rfm_columns::Obstacle;
 
 use crate::collision::collide;
+use crate::error::warn;
 use crate::evaluate::ask;
 use crate::mesh::{Found, PyMesh};
 use crate::path::first_entry;
@@ -524,8 +525,9 @@ impl PySolid {
         Self::new(self.program.bind(py), self.solid.clone(), self.stretch, Some(aabb(r#box)?))
     }
 
-    /// The volume, m³, found on meshes with `cells` cells, two thirds and half as many along the longest side. A sheet
-    /// too thin for these is measured along lines that cross it.
+    /// The volume, m³, found on meshes with `cells` cells, two thirds and half as many along the longest side. A solid of
+    /// which parts are too thin for these is measured along lines that cross it; a warning says if more than a hundredth
+    /// of the volume is uncertain.
     ///
     /// Parameters
     /// ----------
@@ -535,7 +537,11 @@ impl PySolid {
     #[pyo3(text_signature = "($self, cells=96, *, threads=None)")]
     fn volume(&self, py: Python<'_>, cells: usize, threads: Threads) -> PyResult<f64> {
         let solid = self.solid.clone();
-        run_watched(py, threads, move |watch| crate::mesh::volume(&solid, cells, watch))?
+        let found = run_watched(py, threads, move |watch| crate::mesh::volume(&solid, cells, watch))??;
+        if let Some(doubt) = &found.doubt {
+            warn(py, doubt)?;
+        }
+        Ok(found.volume)
     }
 
     /// A closed triangle mesh of the surface.

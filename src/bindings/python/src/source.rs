@@ -1,14 +1,12 @@
 //! Solids as source text.
 
-use std::ffi::CString;
-
-use pyo3::exceptions::{PyTypeError, PyUserWarning};
+use pyo3::exceptions::PyTypeError;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use rfm::Solid;
 use rfm::source::{self, Options, Param, Target};
 
-use crate::error::{raised, refused};
+use crate::error::{raised, refused, warn};
 use crate::program::PyProgram;
 
 /// What Python asks of a text.
@@ -73,8 +71,7 @@ pub fn text(
     let values = program.params().iter().filter(|param| constants.contains(&&*param.name));
     origin.extend(source::constants(values.map(|param| (&*param.name, param.value))));
     if let Some(kept) = kept {
-        let message = CString::new(&*kept).map_err(refused)?;
-        PyErr::warn(py, &py.get_type::<PyUserWarning>(), &message, 1)?;
+        warn(py, &kept)?;
         origin.push(format!("{kept}."));
     }
     let options = Options { prefix, sign, distance, params, origin, ..Options::default() };

@@ -67,6 +67,11 @@ def test_meshes_are_arrays(pawn, tmp_path):
 def test_a_sheet_too_thin_for_cells_has_its_volume():
     sheet = rfm.load("rfm 1\nsolid sheet = box([0, 0, 0], [10, 10, 0.01])\n")["sheet"]
     assert sheet.volume() == pytest.approx(1.0, rel=2e-3)
+    # cells show a little of these, or some of their parts
+    shell = rfm.load("rfm 1\nsolid shell = sphere(1).shell(0.001)\n")["shell"]
+    assert shell.volume() == pytest.approx(4 * np.pi * 0.001, rel=0.01)
+    wing = rfm.load("rfm 1\nsolid wing = sphere(0.5) or box([0, 0, 0], [4, 4, 0.001])\n")["wing"]
+    assert wing.volume() == pytest.approx(0.5236 + 0.0158, rel=0.01)
 
 
 @pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="no pipes with names here")
