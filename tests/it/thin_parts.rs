@@ -183,6 +183,25 @@ fn what_hides_has_a_place_and_a_thickness() {
     assert!(slit.count > 100 && (slit.thickness - 0.007).abs() < 0.001 && slit.is_gap, "{slit:?}");
 }
 
+/// Slits, films, foils, bumps and voids of a millionth of the solid. (Newton's method halves its way to what is so thin, and
+/// was ended after eight steps.)
+#[test]
+fn parts_of_a_millionth_are_counted() {
+    let cube = "box([-1, -1, -1], [1, 1, 1])";
+    for text in [
+        format!("{cube} \\ box([0.3, -2, -2], [0.300003, 2, 2])"),
+        format!("{cube} or box([-0.5, -0.5, 1.2], [0.5, 0.5, 1.200001])"),
+        "cylinder(1, 2) \\ layer(z, 1, 1.000001)".to_string(),
+        "sphere(1) \\ layer(x, 0.3, 0.300001)".to_string(),
+        "sphere(1) or sphere(1e-5).move([0.6, 0, 0.800001])".to_string(),
+        "sphere(1) \\ sphere(1e-5).move([0.31, 0.22, 0.13])".to_string(),
+    ] {
+        let (_, thin) = looked_at(&solid(&text), 96);
+        println!("{text}: {} cells, {:.1e} m", thin.count, thin.thickness);
+        assert!(thin.count > 0, "{text}");
+    }
+}
+
 #[test]
 fn faces_that_coincide_and_smooth_surfaces_hide_nothing() {
     let nut = "(all i in 0..6: half_space([1, 0, 0], [1, 0, 0]).rotate_z(i*60 deg)) and 0 <= z <= 0.5 \\ cylinder(0.5, 0.5)";

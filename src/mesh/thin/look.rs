@@ -30,8 +30,9 @@ const BESIDE: [f64; 3] = [1e-2, 1e-4, 1e-6];
 /// The most that outward rounding may leave of a slope that is zero.
 const NO_SLOPE: f64 = f64::MIN_POSITIVE;
 
-/// Maximum number of steps of Newton's method onto a face.
-const STEPS: usize = 8;
+/// Maximum number of steps of Newton's method onto a face. It halves the distance from something much thinner than that,
+/// as a ball or a slit is far away, until it is as near as that is thin.
+const STEPS: usize = 40;
 
 /// A point nearer to a face than this, in cells, is on it.
 const ON_FACE: f64 = 1e-8;

@@ -68,10 +68,13 @@ impl DivergenceFree {
         core.sum(&pass, [&self.free], [&mut self.field]);
         let share = mean_share(core, dt, relaxation);
         let (spacing, packing) = (core.parameters.spacing(), core.parameters.packing);
+        // pressures grow with the weight at once, and a mean would come late
+        let growth = core.growth_of_weight(self.last_dt);
         let Particles { position, velocity, pressure, .. } = &mut core.particles;
         for (i, (mean, now)) in pressure.iter_mut().zip(&self.field).enumerate() {
             let speed = (velocity.get(i) - self.whole.at(position.get(i))).length();
             // the pressure that a particle bore a spacing ago belongs to another place
+            *mean *= growth;
             let still = hydrostatic.map_or(0.0, |hydrostatic| hydrostatic.pressure[i]);
             *mean += share.max((dt * speed / spacing).min(1.0)) * (now / packing + still - *mean);
         }
