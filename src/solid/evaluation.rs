@@ -27,6 +27,14 @@ pub struct Contact {
     pub mean_curvature: f64,
 }
 
+impl Contact {
+    /// The place of the surface that was found from a point `p`; the point itself where none was.
+    pub fn foot(&self, p: DVec3) -> DVec3 {
+        let foot = p - self.distance * self.normal;
+        if foot.is_finite() { foot } else { p }
+    }
+}
+
 impl Solid {
     /// ω at a point.
     #[inline]
@@ -124,10 +132,12 @@ impl Solid {
         self.twist().map_or_else(|| self.face_velocity(p), |twist| twist.at(p))
     }
 
-    /// The velocity along its normal of the face nearest to a point.
+    /// The velocity along its normal of the face nearest to a point. Away from the face, the formula is that of a surface
+    /// of another value of ω, which may be faster or slower.
     fn face_velocity(&self, p: DVec3) -> DVec3 {
+        let foot = self.estimated_contact(p).foot(p);
         let mut out = [0.0; 3];
-        self.evaluate(ProgramKind::Velocity, p.to_array(), &mut out);
+        self.evaluate(ProgramKind::Velocity, foot.to_array(), &mut out);
         DVec3::from_array(out)
     }
 

@@ -185,3 +185,25 @@ fn meshes_are_in_the_unit_that_is_asked_for() {
     let plain = rfm(here, &["mesh", "post.rfm", "-o", "p.stl", "--cells", "16"]).expect(0);
     assert!(plain.stdout.contains("in metres; most programs read .stl as millimetres: --unit mm"));
 }
+
+/// A bearing with half a millimetre of play in cells of 1.3 mm: where two faces lie in one cell, triangles of marching cubes
+/// pass through each other.
+#[test]
+fn triangles_that_cross_are_told_of() {
+    let text = "rfm 1
+let ring = cylinder(40 mm, 18 mm) \\ cylinder(34 mm, 1).move([0, 0, -0.5])
+    or cylinder(26 mm, 18 mm) \\ cylinder(20 mm, 1).move([0, 0, -0.5])
+solid bearing = ring \\ torus(30 mm, 5.5 mm).move([0, 0, 9 mm])
+    or any i in 0..9: sphere(5 mm, [30 mm, 0, 9 mm]).rotate_z(i*40 deg)
+";
+    let said = |method: &str| {
+        let arguments = ["mesh", "-", "--cells", "64", "--method", method];
+        rfm_reading(root(), &arguments, text.as_bytes()).expect(0).stderr
+    };
+    assert!(
+        said("mc").contains("pairs of triangles cross: more cells part them, and `--method dc`"),
+        "{}",
+        said("mc")
+    );
+    assert!(!said("dc").contains("triangles cross"), "{}", said("dc"));
+}

@@ -322,10 +322,14 @@ fn the_wall_of_a_turning_blade_moves_as_a_rigid_body() {
 #[test]
 fn a_growing_ball_pushes_its_surface_outwards() {
     let ball = solid("sphere(0.5 + 0.25*t)").at(1.0);
+    let squares = solid("x^2 + y^2 + z^2 <= (0.5 + 0.25*t)^2").at(1.0);
     for direction in [DVec3::X, DVec3::new(0.6, 0.0, -0.8)] {
         assert!(ball.wall_velocity(0.75 * direction).distance(0.25 * direction) < 1e-15);
-        // this is the surface nearest to it, also from inside
-        assert!(ball.wall_velocity(0.6 * direction).dot(direction) > 0.2);
+        // this is the surface nearest to it, from inside and from outside, whatever ω grows like there
+        for (ball, away) in [(&ball, 0.6), (&ball, 0.9), (&squares, 0.6), (&squares, 0.9)] {
+            let found = ball.wall_velocity(away * direction);
+            assert!(found.distance(0.25 * direction) < 0.005, "{found} at {away}");
+        }
     }
 }
 

@@ -316,6 +316,15 @@ fn remark(solid: &Solid, mesh: &Mesh, (thin, grid): (&ThinCells, Option<&Grid>),
         };
         note(format!("{what} {}", hidden(thin, grid)));
     }
+    // faces of walls and gaps that lie in one cell may pass through each other
+    let crossing = if thin.count > 0 && !thin.is_wedge { mesh::self_intersections(mesh).len() } else { 0 };
+    if crossing > 0 {
+        let help = match options.method {
+            MeshMethod::Mc => "more cells part them, and `--method dc` keeps triangles apart",
+            MeshMethod::Dc => "more cells part them",
+        };
+        note(format!("{} of triangles cross: {help}", output::counted(crossing, "pair")));
+    }
     match (thin.ended, grid) {
         (true, Some(grid)) if options.budget.is_none() && !knows_ranges(solid, grid.bounds()) => {
             note(without_ranges(solid));

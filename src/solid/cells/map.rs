@@ -399,7 +399,7 @@ impl Nearest {
     }
 
     fn velocity(&self, leaves: &Leaves, p: DVec3) -> DVec3 {
-        leaves.velocity(self.leaf, p)
+        leaves.velocity(self.leaf, self.contact().foot(p))
     }
 
     #[inline]
