@@ -114,7 +114,9 @@ impl Experiment {
         let mut parameters = parameters::of_scene(&program, &scene, mass, typical_speed);
         let mut method = scene.method;
         let wholes = || parts.iter().map(|part| &part.whole);
-        let has_surface = || free_surface::has_surface(&scene, &fluid, wholes(), parameters.spacing());
+        let spacing = parameters.spacing();
+        let has_surface =
+            || free_surface::has_surface(&scene, &fluid, wholes(), spacing, free_surface::WHENEVER);
         method.settle(&has_surface);
         let clamped = parameters::clamped(&scene, &method, &has_surface);
         let scene = Scene { method, ..scene };
