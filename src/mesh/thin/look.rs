@@ -30,9 +30,11 @@ const BESIDE: [f64; 3] = [1e-2, 1e-4, 1e-6];
 /// The most that outward rounding may leave of a slope that is zero.
 const NO_SLOPE: f64 = f64::MIN_POSITIVE;
 
-/// Maximum number of steps of Newton's method onto a face. It halves the distance from something much thinner than that,
-/// as a ball or a slit is far away, until it is as near as that is thin.
-const STEPS: usize = 40;
+/// Maximum number of steps of Newton's method onto a face, and that of steps each of which is at most such a part of the
+/// one before. The distance from what is much thinner than that, as a ball or a slit, is halved until it is as near.
+const STEPS: usize = 8;
+const STEPS_OF_HALVES: usize = 40;
+const NEARLY_HALF: f64 = 0.6;
 
 /// A point nearer to a face than this, in cells, is on it.
 const ON_FACE: f64 = 1e-8;
@@ -531,16 +533,22 @@ impl Look<'_> {
 /// The surface of a face by Newton's method. `None` if it leaves the box or does not settle.
 fn descend(at: &dyn Fn(DVec3) -> (f64, DVec3), start: DVec3, within: &Aabb, size: f64) -> Option<Foot> {
     let mut p = start;
-    for _ in 0..STEPS {
+    let mut last = f64::INFINITY;
+    for number in 0..STEPS_OF_HALVES {
         let (omega, gradient) = at(p);
         let step = gradient * (omega / gradient.length_squared());
         p -= step;
         if !p.is_finite() || !within.contains(p) {
             return None;
         }
-        if step.length() <= ON_FACE * size {
+        let length = step.length();
+        if length <= ON_FACE * size {
             return Some(Foot { at: p, normal: unit(-gradient)? });
         }
+        if number + 1 >= STEPS && length > NEARLY_HALF * last {
+            return None;
+        }
+        last = length;
     }
     None
 }
