@@ -204,9 +204,11 @@ struct Pressed {
     wall_rate: f64,
 }
 
+// inlined, so that what a pass does not sum costs it nothing
 impl Rates<'_> {
     /// The results of a particle: acceleration, rate of the density and the density that places say, its drift, the part of
     /// its kernel that is filled, crowding, the mean velocity around it, and how far it belongs to the depth.
+    #[inline(always)]
     pub fn finish(&self, i: usize, contents: Contents, sums: &Sums) -> [f64; 14] {
         let parameters = self.parameters;
         let rest = parameters.rest_density;
@@ -252,6 +254,7 @@ impl Rates<'_> {
     }
 
     /// The viscous force on a particle. A fluid without viscosity feels no friction, and most have none.
+    #[inline(always)]
     fn viscous(&self, i: usize, contents: Contents, sums: &Sums, velocity: DVec3) -> Viscous {
         let laminar = self.laminar;
         let drag = match self.spin {
@@ -277,6 +280,7 @@ impl Rates<'_> {
         }
     }
 
+    #[inline(always)]
     fn filling(
         &self,
         i: usize,
@@ -309,6 +313,7 @@ impl Rates<'_> {
     /// The force by pressures, and how fast the fluid is compressed. Where pressures do not act by differences, a
     /// particle's own pressure pushes particles apart, and walls push like mirror images; without crowding the sums
     /// already contain the part of the pairs.
+    #[inline(always)]
     fn pressed(
         &self,
         i: usize,
@@ -355,6 +360,7 @@ impl Rates<'_> {
     }
 
     /// Notes what the particle does to the walls near it, if somebody asks for it.
+    #[inline(always)]
     fn act_on_walls(
         &self,
         i: usize,
@@ -382,6 +388,7 @@ impl Rates<'_> {
 
     /// The rate of the density besides that of the sums, kg/m³/s: diffusion, the return to what places say, and, with
     /// differences, all that the equation of continuity says.
+    #[inline(always)]
     fn drift(&self, i: usize, contents: Contents, sums: &Sums, filling: &Filling, continuity: f64) -> f64 {
         let mut denser = self.diffusion * self.steepness * sums.denser;
         if contents.even {
