@@ -30,8 +30,9 @@ const ROUNDING: f64 = 1e-6;
 /// Missing loads above this part get a warning.
 const MUCH: f64 = 0.02;
 
-/// Distances between points, in spacings: the first for which there are not too many.
-const STEPS: [f64; 2] = [1.0 / 6.0, 0.5];
+/// Distances between points, in spacings: the first for which there are not too many. The last is too coarse to see where a
+/// particle has room, so that only those at the start count.
+const STEPS: [f64; 3] = [1.0 / 6.0, 1.0 / 3.0, 0.5];
 
 /// The most points that are looked at.
 const MOST_POINTS: f64 = 2e7;
@@ -82,12 +83,12 @@ impl Experiment {
                 Gravity::Turning(_) | Gravity::Field(_) => 0.0,
             };
             let newtons = match newtons > 0.0 {
-                true => format!(", which pushes it with {} N,", rounded(newtons)),
+                true => format!(", a force of {} N", rounded(newtons)),
                 false => String::new(),
             };
             let message = format!(
                 "no particle finds room beside `{}` at {}, where the fluid's shape is: at least {:.0} % of the load of a \
-                 fluid at rest{newtons} is missing there",
+                 fluid at rest is missing there{newtons}",
                 body.solid.name(),
                 place(deepest.1, spacing),
                 100.0 * part

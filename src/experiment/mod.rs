@@ -114,9 +114,7 @@ impl Experiment {
         let mut parameters = parameters::of_scene(&program, &scene, mass, typical_speed);
         let mut method = scene.method;
         let wholes = || parts.iter().map(|part| &part.whole);
-        let spacing = parameters.spacing();
-        let has_surface =
-            || free_surface::has_surface(&scene, &fluid, wholes(), spacing, free_surface::WHENEVER);
+        let has_surface = || free_surface::has_surface(&scene, &fluid, wholes(), parameters.spacing());
         method.settle(&has_surface);
         let clamped = parameters::clamped(&scene, &method, &has_surface);
         let scene = Scene { method, ..scene };
@@ -220,9 +218,12 @@ impl Experiment {
         let mut particles = std::mem::take(&mut filling.particles);
         self.set_in_motion(&mut particles);
         let filling::Filling { carved, mass, fills_vessel, .. } = filling;
-        let is_sealed = fills_vessel && self.keeps_its_room();
-        let parameters =
-            Parameters { particle_mass: mass, fills_vessel, is_sealed, ..self.parameters.clone() };
+        let parameters = Parameters {
+            particle_mass: mass,
+            fills_vessel,
+            is_sealed: fills_vessel,
+            ..self.parameters.clone()
+        };
         let field = match &self.scene.gravity {
             Gravity::Field(nodes) => Some(vector_field(&self.program, nodes)),
             Gravity::Still(_) | Gravity::Turning(_) => None,

@@ -2,7 +2,7 @@
 
 use glam::DVec3;
 
-use super::{Body, Experiment, free_surface, refuse};
+use super::{Body, Experiment, refuse};
 use crate::Solid;
 use crate::compile::Error;
 use crate::diagnostic::{Code, Diagnostic, Span};
@@ -362,15 +362,6 @@ impl Experiment {
         let around = self.around(fluid);
         let near = free_of(&bodies, around);
         near < than && near + sampled(&bodies, &self.scene.domain, |at| !around.contains(at)) < than
-    }
-
-    /// Whether no body that moves will leave more or less room to a fluid that has none to spare, as far as samples show,
-    /// until the end of the run. A run that is continued beyond it has the answer in its checkpoint.
-    pub(super) fn keeps_its_room(&self) -> bool {
-        let bodies = || self.bodies.iter().map(|body| &body.solid);
-        let (spacing, until) = (self.parameters.spacing(), self.scene.run.until);
-        bodies().all(|body| !body.moves())
-            || !free_surface::has_surface(&self.scene, &self.fluid, bodies(), spacing, until)
     }
 
     /// The part of the box that lies so near to a fluid within some bounds that it shows whether the fluid has room.

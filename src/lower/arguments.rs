@@ -36,7 +36,7 @@ impl<'a> Lowering<'a> {
                     let mixed = self.mix_of_shapes(name, arguments);
                     return self.fail(mixed.unwrap_or(foreign));
                 }
-                let in_an_import = self.names.in_an_import(self.scope.source, &name.text);
+                let in_an_import = self.names.in_an_import(self.scope.source, &name.text, true);
                 let mut candidates = self.names.candidates(self.scope.source, true);
                 candidates.extend(builtins::names().map(String::from));
                 let message = format!("unknown function or shape `{}`", name.text);

@@ -225,7 +225,8 @@ impl Lowering<'_> {
             return self.fail(diagnostic);
         }
         let later = self.names.defined_later(self.scope.source, name);
-        if let Some(qualified) = self.names.in_an_import(self.scope.source, name).filter(|_| later.is_none())
+        if let Some(qualified) =
+            self.names.in_an_import(self.scope.source, name, false).filter(|_| later.is_none())
         {
             let diagnostic = diagnostic.at("not defined in this file");
             return self

@@ -122,14 +122,18 @@ impl<'a> Names<'a> {
     }
 
     /// A name that a text lacks as its imports have it, such as `parts.post` for `post`.
-    pub fn in_an_import(&self, source: SourceId, name: &str) -> Option<String> {
+    pub fn in_an_import(&self, source: SourceId, name: &str, is_called: bool) -> Option<String> {
         let own = match source {
             SourceId::Prelude => None,
             SourceId::File => Some(&self.file),
             SourceId::Import(number) => self.imports.get(&number),
         };
         let has_it = |(_, global): &(&String, &Global<'a>)| match global.kind {
-            Kind::Import(of) => self.offered(of).iter().any(|offered| offered == name),
+            Kind::Import(of) => self.of(of, name).is_some_and(|global| match global.kind {
+                Kind::Function(_) => is_called,
+                Kind::Value(_) | Kind::Solid(_) => !is_called,
+                Kind::Scene | Kind::Import(_) => false,
+            }),
             Kind::Value(_) | Kind::Solid(_) | Kind::Function(_) | Kind::Scene => false,
         };
         let import = own?.iter().filter(has_it).map(|(import, _)| import).min()?;

@@ -411,13 +411,11 @@ impl Core {
         parameters.gravity != DVec3::ZERO || gravity_field.is_some() || turning_gravity.is_some()
     }
 
-    /// By how much the weight of the fluid has grown in the last time `passed`, s; one unless gravity is a function of
-    /// time. At most twice or half as much: where there is next to no weight, pressures have other causes.
-    pub fn growth_of_weight(&self, passed: f64) -> f64 {
-        let Some(gravity) = &self.turning_gravity else { return 1.0 };
-        let [before, now] = [self.time - passed, self.time].map(|time| gravity(time).length());
-        let growth = now / before;
-        if growth.is_finite() { growth.clamp(0.5, 2.0) } else { 1.0 }
+    /// Uniform gravity some time ago and now, m/s²; `None` unless it is a function of time and has changed. `ago` is in s.
+    pub fn change_of_gravity(&self, ago: f64) -> Option<[DVec3; 2]> {
+        let gravity = self.turning_gravity.as_ref()?;
+        let change = [self.time - ago, self.time].map(|time| gravity(time));
+        (change[0].is_finite() && change[0] != change[1]).then_some(change)
     }
 
     /// Memory of the state and of the parts that all methods share, bytes.

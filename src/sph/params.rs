@@ -61,8 +61,8 @@ pub struct Parameters {
     /// Whether the fluid fills all room that the box and the obstacles leave, so that it has no surface.
     /// `dfsph` then packs the particles at the start, and finds their `packing`.
     pub fills_vessel: bool,
-    /// Whether it always will. Uniform gravity then moves nothing in it, and `dfsph` adds the hydrostatic pressure that
-    /// it causes to the pressures of the motion.
+    /// Whether it still does. Uniform gravity then moves nothing in it, and `dfsph` adds the hydrostatic pressure that
+    /// it causes to the pressures of the motion. A simulation ends this where walls that move leave more room.
     pub is_sealed: bool,
     /// Part of the room of a fluid that fills its vessel which the volumes of its particles take in sums over
     /// neighbours: particles that have left their lattice leave gaps. One for any other fluid. A simulation

@@ -77,10 +77,10 @@ impl<'t> Slip<'t> {
         opened > self.before().matches('}').count()
     }
 
-    /// Whether what stands before defines this name as a shape.
+    /// Whether what stands before defines this name as a solid.
     fn defines(&self, name: &str) -> bool {
         let all: Vec<&str> = self.text[..self.at].split_whitespace().collect();
-        all.windows(2).any(|pair| matches!(pair[0], "solid" | "let") && pair[1].trim_end_matches('=') == name)
+        all.windows(2).any(|pair| pair[0] == "solid" && pair[1].trim_end_matches('=') == name)
     }
 
     /// A word where none may stand.

@@ -398,7 +398,7 @@ scene rest {
     let experiment = Experiment::new(&program, "rest", Engine::Auto).unwrap_or_else(|e| panic!("{e}"));
     let start = experiment.start().unwrap_or_else(|e| panic!("{e}"));
     let dry = start.warnings.list.into_iter().find(|warning| warning.code.0 == "W0518").expect("a warning");
-    let (_, after) = dry.message.split_once("pushes it with ").expect(&dry.message);
+    let (_, after) = dry.message.split_once("a force of ").expect(&dry.message);
     let newtons: f64 = after.split(' ').next().unwrap().parse().expect(after);
     println!("{}", dry.message);
     // between the disc of 1.1 spacings in radius, beside which a particle of three quarters of a spacing has no room, and

@@ -306,6 +306,9 @@ fn measured(
     Ok((quality, found))
 }
 
+/// Triangles that are compared with one another in about a second.
+const MOST_COMPARED: usize = 2_000_000;
+
 /// Says on standard error what the grid could not see, and why a mesh is empty.
 fn remark(solid: &Solid, mesh: &Mesh, (thin, grid): (&ThinCells, Option<&Grid>), options: &Options) {
     if let Some(grid) = grid.filter(|_| thin.count > 0) {
@@ -317,7 +320,8 @@ fn remark(solid: &Solid, mesh: &Mesh, (thin, grid): (&ThinCells, Option<&Grid>),
         note(format!("{what} {}", hidden(thin, grid)));
     }
     // faces of walls and gaps that lie in one cell may pass through each other
-    let crossing = if thin.count > 0 && !thin.is_wedge { mesh::self_intersections(mesh).len() } else { 0 };
+    let may_cross = thin.count > 0 && !thin.is_wedge && mesh.triangles.len() <= MOST_COMPARED;
+    let crossing = if may_cross { mesh::self_intersections(mesh).len() } else { 0 };
     if crossing > 0 {
         let help = match options.method {
             MeshMethod::Mc => "more cells part them, and `--method dc` keeps triangles apart",

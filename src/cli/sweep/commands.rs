@@ -41,12 +41,21 @@ fn plain_name(flag: &str, asked: Option<&PathBuf>, sweep: &SweepOptions) -> Resu
     let folder = path.parent().map(Path::shown).filter(|folder| !folder.is_empty());
     let advice = match (name, folder) {
         (Some(name), Some(folder)) if sweep.into.is_none() => {
+            let (folder, name) = (as_argument(&folder), as_argument(&name));
             format!("the folder of the sweep is given by --into DIR: write --into {folder} {flag} {name}")
         }
-        (Some(name), _) => format!("the folder of the sweep is given by --into DIR: write {flag} {name}"),
+        (Some(name), _) => {
+            format!("the folder of the sweep is given by --into DIR: write {flag} {}", as_argument(&name))
+        }
         (None, _) => "write the name of a file, and the folder of the sweep by --into DIR".into(),
     };
     Err(Failure::usage(format!("{message}; {advice}")))
+}
+
+/// A path as an argument in a shell.
+fn as_argument(path: &str) -> String {
+    let is_plain = |c: char| c.is_alphanumeric() || "-_./=+,:@%".contains(c);
+    if path.chars().all(is_plain) { path.to_string() } else { format!("'{}'", path.replace('\'', "'\\''")) }
 }
 
 /// The file of a plain name in the folder of a combination.

@@ -15,8 +15,8 @@ use crate::syntax::ast::Entry;
 /// A fluid denser than this, kg/m³, is asked about: molten osmium has 20 000.
 const MOST_DENSITY: f64 = 25_000.0;
 
-/// A fluid that is lighter than this, kg/m³, and whose density has no unit is asked about: liquid hydrogen has 71.
-const LEAST_DENSITY: f64 = 30.0;
+/// Densities of liquids in g/cm³. A bare one of them is asked about, because it is lighter than any liquid in kg/m³.
+const IN_GRAMS: std::ops::RangeInclusive<f64> = 0.5..=25.0;
 
 /// What a fluid has at the start and not later, and what is said where it depends on the time.
 pub(super) struct Start {
@@ -263,12 +263,12 @@ impl<'a> Lowering<'a> {
             );
         }
         if let (Some(density), Some((_, value))) = (density, block.setting(keys::DENSITY.name))
-            && (LEAST_DENSITY..1000.0 * LEAST_DENSITY).contains(&(1000.0 * density))
+            && IN_GRAMS.contains(&density)
             && self.is_bare(value)
         {
             let message = format!("a fluid of {} kg/m³ is lighter than any liquid", significant(density));
-            let written = self.written(value).filter(|text| text.parse::<f64>().is_ok()).unwrap_or("1");
-            let help = format!("is `{written} g/cm^3` meant? if not, write `{written} kg/m^3`");
+            let number = significant(density);
+            let help = format!("is `{number} g/cm^3` meant? if not, write `{number} kg/m^3`");
             self.report(Diagnostic::warning(Code::HEAVY_FLUID, value.span, message).help(help));
         }
         let mass = self.number_key(block, &keys::MASS);

@@ -190,20 +190,18 @@ impl<'a> Lowering<'a> {
 
     /// How a block is written whose key was given a value.
     fn block_form(&self, key: &str, value: &Expr) -> String {
-        let is_shape = match &value.kind {
-            ExprKind::Name(name) => self
-                .names
-                .of(value.span.source, name)
-                .is_some_and(|global| matches!(global.kind, Kind::Solid(_) | Kind::Value(_))),
+        let is_shape = |kind: &Kind<'_>| match kind {
+            Kind::Solid(_) => true,
+            Kind::Value(Value::Number(node)) => self.known_value(*node).is_none(),
+            Kind::Value(_) | Kind::Function(_) | Kind::Scene | Kind::Import(_) => false,
+        };
+        let is_name_of_shape = match &value.kind {
+            ExprKind::Name(name) => {
+                self.names.of(value.span.source, name).is_some_and(|global| is_shape(&global.kind))
+            }
             _ => false,
         };
-        if key == "solver"
-            && let ExprKind::Name(name) = &value.kind
-            && let Some(method) = Method::named(name)
-        {
-            return format!("method: {}", method.name());
-        }
-        block_form(key, self.written(value).unwrap_or("…"), is_shape)
+        block_form(key, self.written(value).unwrap_or("…"), is_name_of_shape)
             .unwrap_or_else(|| format!("{key} {{ … }}"))
     }
 

@@ -9,8 +9,9 @@
  * program: questions about them give NaN or RFM_BAD_ARGUMENT, and to free them does nothing.
  *
  * Functions that may fail return RFM_OK or what went wrong. The parameter `error` may be null; otherwise it gets an
- * error object, to be freed with rfm_error_free, or null after RFM_OK. No function throws or ends the process;
- * floating-point exceptions that the host traps do not, and its way of rounding changes no value.
+ * error object, to be freed with rfm_error_free, or null after RFM_OK. No function throws or ends the process.
+ * On x86-64 floating-point exceptions that the host traps end nothing within them, and its way of rounding changes no value,
+ * but for rfm_math_*, which generated code calls as it would those of the C library.
  *
  * Texts are UTF-8 and end with a zero byte. Those that functions return belong to the handle that they came from.
  *

@@ -78,10 +78,17 @@ pub fn volume(solid: &Solid, cells: usize, watch: &Watch) -> PyResult<Measured> 
         }
     }
     match (mesh::by_lines(&*surface, bounds, watch), by_mesh) {
+        // what the mesh lacks is less than what the lines leave uncertain
+        (Some(found), Some(volume)) if (found.volume - volume).abs() <= found.error => {
+            Ok(Measured::certain(volume))
+        }
         (Some(found), _) => {
             let error = found.error / found.volume;
             let doubt = (error > LARGE_ERROR).then(|| {
-                format!("parts of the solid are too thin for {cells} cells, so its volume is known to {:.0} % only", 100.0 * error)
+                format!(
+                    "parts of the solid are too thin for {cells} cells, so its volume is known to {:.0} % only",
+                    100.0 * error
+                )
             });
             Ok(Measured { volume: found.volume, doubt })
         }

@@ -1,4 +1,4 @@
-//! The hydrostatic pressure of a fluid that fills its vessel, and always will.
+//! The hydrostatic pressure of a fluid that fills its vessel.
 //!
 //! Uniform gravity moves nothing in such a fluid: the pressure ρ₀·g·(x − top) balances it everywhere. So gravity is left
 //! out of the motion ([`Parameters::pull`](crate::sph::Parameters::pull)), and this pressure is added to what is reported
@@ -9,6 +9,8 @@
 //! A wall bears what it does to the particles near it: all of the weight of such a particle, less what other particles
 //! bear of it. Those forces are taken from the sums over pairs, whose gradient of a linear pressure is a few per cent too
 //! small; they count so much more that walls bear all of the weight.
+//!
+//! Walls that move may open the vessel. From then on gravity moves the fluid as any other.
 
 use glam::DVec3;
 use rayon::prelude::*;
@@ -25,17 +27,47 @@ use crate::sph::{
 /// The least part of a linear pressure's gradient that sums over pairs are expected to find.
 const LEAST_FOUND: f64 = 0.1;
 
+/// Steps from one look at the room that moving walls leave to the next.
+const LOOK: u64 = 16;
+
+/// A vessel is open if its room is this many times the volume of the fluid: 1.03 at the start still count as full, and
+/// samples are off by a hundredth.
+const OPEN: f64 = 1.05;
+
+/// Samples that are to lie in the room, and the most that are taken.
+const SAMPLES: f64 = 4096.0;
+const MOST_SAMPLES: f64 = 262_144.0;
+
+/// Whether walls that move leave the fluid of a sealed vessel more room than it fills. It is looked for now and then.
+pub(super) fn has_opened(core: &Core) -> bool {
+    let Core { parameters, boundary, particles, .. } = core;
+    if !(parameters.is_sealed && boundary.any_moves() && core.steps.is_multiple_of(LOOK)) {
+        return false;
+    }
+    let fluid = particles.len() as f64 * parameters.particle_mass / parameters.rest_density;
+    let whole = boundary.domain.volume();
+    let samples = (SAMPLES * whole / fluid).clamp(SAMPLES, MOST_SAMPLES) as u32;
+    let is_free = |k: &u32| {
+        let at = boundary.domain.evenly(*k);
+        boundary.fields_at(at).all(|field| field.omega(at) < 0.0)
+    };
+    let free = (1..=samples).into_par_iter().filter(is_free).count();
+    whole * free as f64 / f64::from(samples) > OPEN * fluid
+}
+
 /// The hydrostatic pressure at the present places.
 pub(super) struct Hydrostatic {
-    /// Of each particle, Pa; zero at the highest wall of the fluid that it belongs to.
+    /// The body of fluid of each particle, and their number.
+    bodies: (Vec<usize>, usize),
+    /// Of each particle, Pa; zero half a spacing above the highest particle of the body of fluid that it belongs to.
     pub pressure: Vec<f64>,
 }
 
 impl Hydrostatic {
-    /// The pressure in the given bodies of fluid: the body of each particle, and their number.
-    pub fn of(core: &Core, (of, count): &(Vec<usize>, usize)) -> Self {
+    /// The pressure under a uniform gravity, m/s², in bodies of fluid: the body of each particle, and their number.
+    pub fn of(core: &Core, bodies: (Vec<usize>, usize), g: DVec3) -> Self {
         let parameters = &core.parameters;
-        let g = parameters.gravity;
+        let (of, count) = &bodies;
         let position = &core.particles.position;
         let mut least = vec![f64::INFINITY; *count];
         for (x, body) in position.iter().zip(of) {
@@ -43,7 +75,18 @@ impl Hydrostatic {
         }
         let above = 0.5 * parameters.spacing() * g.length();
         let at = |(x, body): (DVec3, &usize)| parameters.rest_density * (g.dot(x) - least[*body] + above);
-        Self { pressure: position.iter().zip(of).map(at).collect() }
+        let pressure = position.iter().zip(of).map(at).collect();
+        Self { pressure, bodies }
+    }
+
+    /// The pressure of all of the fluid as one body.
+    pub fn of_one_body(core: &Core, g: DVec3) -> Self {
+        Self::of(core, (vec![0; core.particles.len()], 1), g)
+    }
+
+    /// That of the same bodies under another gravity.
+    pub fn under(&self, core: &Core, g: DVec3) -> Self {
+        Self::of(core, self.bodies.clone(), g)
     }
 
     /// Notes what walls bear of the fluid's weight.

@@ -85,7 +85,7 @@ use super::super::{
 };
 use super::ahead::Ahead;
 use super::arrest::Arrest;
-use super::hydrostatic::Hydrostatic;
+use super::hydrostatic::{self, Hydrostatic};
 use super::passes::{Constants, Continuation, Densities, Drag};
 use super::rigid::Rigid;
 use super::solver::{Begin, Errors, Goal, RateOf, Solver};
@@ -210,6 +210,9 @@ impl Scheme for DivergenceFree {
         self.settle(core, &mut []);
         self.last_dt = dt;
         core.check_finite(dt)?;
+        if hydrostatic::has_opened(core) {
+            core.parameters.is_sealed = false;
+        }
         Ok(dt)
     }
 
@@ -424,11 +427,12 @@ impl DivergenceFree {
         // the compression without pressure; each iteration finds how much of it s takes away
         self.forces.find_rate_of(core, &self.walls, &core.particles.velocity, RateOf::Velocity(&self.whole));
         let found = (&self.forces.rate[..], &self.loaded[..], &self.debt[..]);
-        let mut hydrostatic = None;
+        let mut carried = None;
         if core.parameters.fills_vessel {
             // particles that have a wall of a spacing between them belong to two bodies
             let bodies = bodies(core, core.parameters.spacing());
-            hydrostatic = core.parameters.is_sealed.then(|| Hydrostatic::of(core, &bodies));
+            let is_sealed = core.parameters.is_sealed;
+            carried = is_sealed.then(|| Hydrostatic::of(core, bodies.clone(), core.parameters.gravity));
             full::find_unwanted(&mut self.free, &bodies, found, relaxation);
             // a mean over neighbours changes those of the bodies
             full::smooth(core, &self.walls, &mut self.free, &mut self.field);
@@ -454,7 +458,7 @@ impl DivergenceFree {
         self.iterations = self.forces.solve(core, &self.walls, &self.free, dt, goal, Begin::Last);
         if let Some(reaction) = Reaction::of(core, dt) {
             self.forces.note_walls(reaction, &self.walls, rest, (&self.forces.push, &self.forces.s));
-            if let Some(hydrostatic) = &hydrostatic {
+            if let Some(hydrostatic) = &carried {
                 hydrostatic.note_walls(core, (&self.forces, &self.walls), reaction);
             }
         }
@@ -471,7 +475,7 @@ impl DivergenceFree {
             self.ahead.give(core, (&self.forces, &self.walls), dt);
         }
         add_scaled(&mut core.acceleration, &self.ahead.push, 0.5);
-        self.report_pressure(core, dt, relaxation, hydrostatic.as_ref());
+        self.report_pressure(core, dt, relaxation, carried.as_ref());
     }
 
     /// Finds the displacements of a step of the length dt: those by shifting, and those that keep densities

@@ -48,7 +48,8 @@ impl DivergenceFree {
     }
 
     /// Finds the pressures around the particles, and averages the reported ones over at most the time in which a
-    /// particle moves by a spacing, with the hydrostatic one of a full vessel. Packed particles are heavier than they count in the sums, and so is their weight.
+    /// particle moves by a spacing, with the hydrostatic one of a full vessel. Packed particles are heavier than they
+    /// count in the sums, and so is their weight.
     pub(super) fn report_pressure(
         &mut self,
         core: &mut Core,
@@ -68,15 +69,33 @@ impl DivergenceFree {
         core.sum(&pass, [&self.free], [&mut self.field]);
         let share = mean_share(core, dt, relaxation);
         let (spacing, packing) = (core.parameters.spacing(), core.parameters.packing);
-        // pressures grow with the weight at once, and a mean would come late
-        let growth = core.growth_of_weight(self.last_dt);
+        self.follow_the_weight(core, hydrostatic);
         let Particles { position, velocity, pressure, .. } = &mut core.particles;
         for (i, (mean, now)) in pressure.iter_mut().zip(&self.field).enumerate() {
             let speed = (velocity.get(i) - self.whole.at(position.get(i))).length();
             // the pressure that a particle bore a spacing ago belongs to another place
-            *mean *= growth;
             let still = hydrostatic.map_or(0.0, |hydrostatic| hydrostatic.pressure[i]);
             *mean += share.max((dt * speed / spacing).min(1.0)) * (now / packing + still - *mean);
+        }
+    }
+
+    /// Changes the means of pressures by what a gravity that is a function of time has changed in them since the last
+    /// step: means alone would come late. That is all of the hydrostatic pressure in a sealed vessel, and elsewhere as much
+    /// of a pressure as weight can have caused.
+    fn follow_the_weight(&self, core: &mut Core, hydrostatic: Option<&Hydrostatic>) {
+        let Some([before, now]) = core.change_of_gravity(self.last_dt) else { return };
+        if let Some(carried) = hydrostatic {
+            let earlier = carried.under(core, before);
+            let changes = carried.pressure.iter().zip(&earlier.pressure);
+            let means = core.particles.pressure.iter_mut();
+            means.zip(changes).for_each(|(mean, (now, before))| *mean += now - before);
+            return;
+        }
+        let growth = now.length() / before.length() - 1.0;
+        if growth.is_finite() {
+            let by_weight = Hydrostatic::of_one_body(core, before).pressure;
+            let means = core.particles.pressure.iter_mut();
+            means.zip(&by_weight).for_each(|(mean, most)| *mean += growth * mean.clamp(0.0, *most));
         }
     }
 }
