@@ -306,8 +306,8 @@ fn measured(
     Ok((quality, found))
 }
 
-/// Triangles that are compared with one another in about a second.
-const MOST_COMPARED: usize = 2_000_000;
+/// Triangles that are compared with one another in a few tenths of a second.
+const MOST_COMPARED: usize = 300_000;
 
 /// Says on standard error what the grid could not see, and why a mesh is empty.
 fn remark(solid: &Solid, mesh: &Mesh, (thin, grid): (&ThinCells, Option<&Grid>), options: &Options) {
@@ -319,15 +319,17 @@ fn remark(solid: &Solid, mesh: &Mesh, (thin, grid): (&ThinCells, Option<&Grid>),
         };
         note(format!("{what} {}", hidden(thin, grid)));
     }
-    // faces of walls and gaps that lie in one cell may pass through each other
-    let may_cross = thin.count > 0 && !thin.is_wedge && mesh.triangles.len() <= MOST_COMPARED;
-    let crossing = if may_cross { mesh::self_intersections(mesh).len() } else { 0 };
+    // faces of walls and gaps that lie in one cell may pass through each other; dual contouring keeps them apart
+    let is_looked_at = options.method == MeshMethod::Mc && mesh.triangles.len() <= MOST_COMPARED;
+    let crossing = match thin.count > 0 && !thin.is_wedge && is_looked_at {
+        true => mesh::self_intersections(mesh).len(),
+        false => 0,
+    };
     if crossing > 0 {
-        let help = match options.method {
-            MeshMethod::Mc => "more cells part them, and `--method dc` keeps triangles apart",
-            MeshMethod::Dc => "more cells part them",
-        };
-        note(format!("{} of triangles cross: {help}", output::counted(crossing, "pair")));
+        let pairs = output::counted(crossing, "pair");
+        note(format!(
+            "{pairs} of triangles cross: more cells part them, and `--method dc` keeps triangles apart"
+        ));
     }
     match (thin.ended, grid) {
         (true, Some(grid)) if options.budget.is_none() && !knows_ranges(solid, grid.bounds()) => {
