@@ -20,9 +20,9 @@ use crate::sph::Particles;
 const NEAR: f64 = 2.0;
 
 /// A particle has room where everything nearer than this is free, and is beside a wall up to that distance from it, in
-/// spacings. In an edge of 60° the nearest place with room is one spacing away.
+/// spacings. In an edge of 60° the nearest place with room is one away.
 const ROOM: f64 = 0.5;
-const BESIDE: f64 = 1.25;
+const BESIDE: f64 = 1.0;
 
 /// Squares of whole numbers that differ by less than this are the same.
 const ROUNDING: f64 = 1e-6;

@@ -401,8 +401,8 @@ scene rest {
     let (_, after) = dry.message.split_once("a force of ").expect(&dry.message);
     let newtons: f64 = after.split(' ').next().unwrap().parse().expect(after);
     println!("{}", dry.message);
-    // between the disc of 1.1 spacings in radius, beside which a particle of three quarters of a spacing has no room, and
-    // that of 2.8, in which none has its middle
+    // between the disc of one spacing in radius, beside which a particle of two thirds of a spacing has no room, and that
+    // of two spacings
     let pressed = |radius: f64| 2943.0 * std::f64::consts::PI * radius.powi(2);
-    assert!(newtons > pressed(1.1 * 0.025) && newtons < pressed(2.8 * 0.025), "{newtons} N");
+    assert!(newtons > pressed(0.025) && newtons < pressed(2.0 * 0.025), "{newtons} N");
 }

@@ -197,7 +197,7 @@ solid bearing = ring \\ torus(30 mm, 5.5 mm).move([0, 0, 9 mm])
     or any i in 0..9: sphere(5 mm, [30 mm, 0, 9 mm]).rotate_z(i*40 deg)
 ";
     let said = |method: &str| {
-        let arguments = ["mesh", "-", "--cells", "64", "--method", method];
+        let arguments = ["mesh", "-", "--cells", "64", "--json", "--method", method];
         rfm_reading(root(), &arguments, text.as_bytes()).expect(0).stderr
     };
     assert!(

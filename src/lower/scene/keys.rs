@@ -201,6 +201,12 @@ impl<'a> Lowering<'a> {
             }
             _ => false,
         };
+        if key == "solver"
+            && let ExprKind::Name(name) = &value.kind
+            && let Some(method) = Method::named(name)
+        {
+            return format!("method: {}", method.name());
+        }
         block_form(key, self.written(value).unwrap_or("…"), is_name_of_shape)
             .unwrap_or_else(|| format!("{key} {{ … }}"))
     }
