@@ -210,7 +210,7 @@ impl Boundary {
     }
 
     /// The obstacles that may be nearer to a place than the support radius.
-    pub fn fields_at(&self, p: DVec3) -> impl Iterator<Item = &dyn Walls> {
+    fn fields_at(&self, p: DVec3) -> impl Iterator<Item = &dyn Walls> {
         self.broad_phase.at(p).map(|k| self.field(k))
     }
 

@@ -10,7 +10,7 @@
 //! bear of it. Those forces are taken from the sums over pairs, whose gradient of a linear pressure is a few per cent too
 //! small; they count so much more that walls bear all of the weight.
 //!
-//! Walls that move may open the vessel. From then on gravity moves the fluid as any other.
+//! Walls that move may open the vessel. From then on gravity moves the fluid, and it has a surface as any other.
 
 use glam::DVec3;
 use rayon::prelude::*;
@@ -49,7 +49,7 @@ pub(super) fn has_opened(core: &Core) -> bool {
     let samples = (SAMPLES * whole / fluid).clamp(SAMPLES, MOST_SAMPLES) as u32;
     let is_free = |k: &u32| {
         let at = boundary.domain.evenly(*k);
-        boundary.fields_at(at).all(|field| field.omega(at) < 0.0)
+        boundary.fields().all(|field| field.omega(at) < 0.0)
     };
     let free = (1..=samples).into_par_iter().filter(is_free).count();
     whole * free as f64 / f64::from(samples) > OPEN * fluid

@@ -211,7 +211,7 @@ impl Scheme for DivergenceFree {
         self.last_dt = dt;
         core.check_finite(dt)?;
         if hydrostatic::has_opened(core) {
-            core.parameters.is_sealed = false;
+            (core.parameters.is_sealed, core.parameters.fills_vessel) = (false, false);
         }
         Ok(dt)
     }
