@@ -17,6 +17,7 @@ use rayon::prelude::*;
 
 use super::solver::Solver;
 use super::walls::Walls;
+use crate::geom::Aabb;
 use crate::sph::{
     core::Core,
     particles::{CHUNK, Vectors},
@@ -34,8 +35,11 @@ const LOOK: u64 = 16;
 /// samples are off by a hundredth.
 const OPEN: f64 = 1.05;
 
-/// Samples that are to lie in the room, and the most that are taken.
-const SAMPLES: f64 = 4096.0;
+/// How far room is looked for around the particles, in spacings.
+const AROUND: f64 = 2.0;
+
+/// Samples that are to lie in the room, and the most that are taken. So many find it to a hundredth.
+const SAMPLES: f64 = 16_384.0;
 const MOST_SAMPLES: f64 = 262_144.0;
 
 /// Whether walls that move leave the fluid of a sealed vessel more room than it fills. It is looked for now and then.
@@ -45,14 +49,16 @@ pub(super) fn has_opened(core: &Core) -> bool {
         return false;
     }
     let fluid = particles.len() as f64 * parameters.particle_mass / parameters.rest_density;
-    let whole = boundary.domain.volume();
-    let samples = (SAMPLES * whole / fluid).clamp(SAMPLES, MOST_SAMPLES) as u32;
+    let hold = |all: Aabb, at: DVec3| Aabb::new(all.min.min(at), all.max.max(at));
+    let nearby = particles.position.iter().fold(Aabb::EMPTY, hold).grown(AROUND * parameters.spacing());
+    let nearby = nearby.intersection(&boundary.domain);
+    let samples = (SAMPLES * nearby.volume() / fluid).clamp(SAMPLES, MOST_SAMPLES) as u32;
     let is_free = |k: &u32| {
-        let at = boundary.domain.evenly(*k);
+        let at = nearby.evenly(*k);
         boundary.fields().all(|field| field.omega(at) < 0.0)
     };
     let free = (1..=samples).into_par_iter().filter(is_free).count();
-    whole * free as f64 / f64::from(samples) > OPEN * fluid
+    nearby.volume() * free as f64 / f64::from(samples) > OPEN * fluid
 }
 
 /// The hydrostatic pressure at the present places.
