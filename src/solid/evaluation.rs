@@ -27,11 +27,22 @@ pub struct Contact {
     pub mean_curvature: f64,
 }
 
+/// Velocities along the normal of one face agree more than this (cosine).
+const SAME_FACE: f64 = 0.99;
+
 impl Contact {
     /// The place of the surface that was found from a point `p`; the point itself where none was.
     pub fn foot(&self, p: DVec3) -> DVec3 {
         let foot = p - self.distance * self.normal;
         if foot.is_finite() { foot } else { p }
+    }
+
+    /// The velocity of the face that was found from `p`, by a formula for that of the nearest face along its normal. Before
+    /// an edge, where another face may be the nearest to the foot, it is that at `p`.
+    pub(in crate::solid) fn velocity_at_foot(&self, p: DVec3, velocity: impl Fn(DVec3) -> DVec3) -> DVec3 {
+        let [here, there] = [p, self.foot(p)].map(velocity);
+        let is_same_face = here.dot(there) >= SAME_FACE * here.length() * there.length();
+        if is_same_face { there } else { here }
     }
 }
 
@@ -135,10 +146,12 @@ impl Solid {
     /// The velocity along its normal of the face nearest to a point. Away from the face, the formula is that of a surface
     /// of another value of ω, which may be faster or slower.
     fn face_velocity(&self, p: DVec3) -> DVec3 {
-        let foot = self.estimated_contact(p).foot(p);
-        let mut out = [0.0; 3];
-        self.evaluate(ProgramKind::Velocity, foot.to_array(), &mut out);
-        DVec3::from_array(out)
+        let velocity = |at: DVec3| {
+            let mut out = [0.0; 3];
+            self.evaluate(ProgramKind::Velocity, at.to_array(), &mut out);
+            DVec3::from_array(out)
+        };
+        self.estimated_contact(p).velocity_at_foot(p, velocity)
     }
 
     /// The distance of [`Solid::contact`] in single precision throughout.

@@ -371,7 +371,7 @@ scene full {{
         println!("pushed with {push} m/s²: {:.2} N, {fastest:.4} m/s in the tank", sum / count);
         let known = DVec3::new(-24.0 * push, 0.0, -24.0 * 9.81);
         assert!((sum / count - known).length() < 0.005 * known.length(), "{} for {known}", sum / count);
-        assert!(fastest < 0.05, "{fastest} m/s");
+        assert!(fastest < 0.1, "{fastest} m/s");
         let Particles { position, pressure, .. } = simulation.particles();
         let middle = 0.2 + 0.5 * push * simulation.time().powi(2);
         for (at, pressure) in position.iter().zip(pressure).filter(|(at, _)| (at.x - middle).abs() < 0.05) {

@@ -399,7 +399,7 @@ impl Nearest {
     }
 
     fn velocity(&self, leaves: &Leaves, p: DVec3) -> DVec3 {
-        leaves.velocity(self.leaf, self.contact().foot(p))
+        self.contact().velocity_at_foot(p, |at| leaves.velocity(self.leaf, at))
     }
 
     #[inline]
