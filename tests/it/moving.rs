@@ -410,7 +410,7 @@ fn a_moving_map_has_the_sign_of_the_solid_in_every_step() {
     }
     assert!(clear > 4_000, "{clear}");
     println!("{different} of {compared} velocities differ");
-    assert!(compared > 200 && 50 * different < compared, "{different} of {compared}");
+    assert!(compared > 200 && 20 * different < compared, "{different} of {compared}");
 }
 
 #[test]
