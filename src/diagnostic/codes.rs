@@ -343,8 +343,9 @@ DRY_WALL = "W0518":
 lies on a floor, in a narrow wedge, or in a gap. Particles keep half a spacing from walls, so such places stay empty, nothing
 presses on the walls there, and water at rest flows into them at the start. The message says how much of the load of a fluid at
 rest is missing at least, the force of that part, and the deepest place where it is. What lifts a body that lies on a
-floor is the little by which its load from below is the greater, so a few per cent of the load may be half of the lift. A quarter of the spacing leaves half of it where walls touch, and a
-quarter in a wedge; a gap needs a spacing that fits into it. Scenes with more than some millions of particles are not looked at.";
+floor is the little by which its load from below is the greater, so a few per cent of the load may be half of the lift. A quarter
+of the spacing leaves half of it where walls touch, and a quarter in a wedge; a gap needs a spacing that fits into it. Scenes with
+more than some millions of particles are not looked at.";
 TENSION_STIRS = "W0509":
 "The surface tension of a divergence-free fluid (dfsph) is a force by normals and curvature. It is not the gradient of an
 energy, and gives particles at the surface a motion that only viscosity ends. The message says how fast that is at most in a
