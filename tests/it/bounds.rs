@@ -376,6 +376,7 @@ fn bounds_hold_the_tip_of_a_needle() {
 }
 
 #[test]
+#[ignore = "long"]
 fn random_bounded_solids_have_bounds_that_hold_all_their_points() {
     let mut runner = TestRunner::new(config(400));
     let result = runner.run(&bounded(), |text| {

@@ -186,6 +186,7 @@ fn the_ends_of_a_tunnel_do_not_cross() {
 }
 
 #[test]
+#[ignore = "long"]
 fn examples_do_not_cross_themselves() {
     let folder = format!("{}/examples", env!("CARGO_MANIFEST_DIR"));
     let mut meshed = 0;

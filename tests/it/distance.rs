@@ -90,6 +90,7 @@ fn clearances_in_the_middle_are_a_good_part_of_the_distance() {
 
 /// Outlines of many edges, each of which goes on beyond the next: no chain of them has an end by itself.
 #[test]
+#[ignore = "long"]
 fn distances_from_finely_cut_outlines_are_found() {
     for copies in [1, 5, 6, 7, 9] {
         let text = format!("polygon(arc([0.7, 0], 0.1, 0°, 360°)).extrude(0, 0.4).polar_repeat({copies})");

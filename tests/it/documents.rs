@@ -121,6 +121,7 @@ const SHORTER: [(&str, &str); 2] = [
 ];
 
 #[test]
+#[ignore = "long"]
 fn every_command_of_the_first_page_works() {
     let folder = tempfile::tempdir().unwrap();
     small_examples(folder.path());

@@ -6,6 +6,7 @@ use rfm::{Experiment, Program};
 
 /// A drum that turns drags the fluid that sticks to it as much as one at rest whose surface moves as fast.
 #[test]
+#[ignore = "long"]
 fn a_turning_drum_drags_the_fluid_along() {
     // four spacings across: with a support of three, where the packed particles begin would weigh more
     let mean_turn = |drum: &str, surface: &str| {
@@ -74,6 +75,7 @@ fn times(text: &str, until: f64) -> Vec<f64> {
 /// as a whole. (When `dfsph` continued velocities behind walls as if these were at rest, 5 m/s stirred the
 /// water to 0.9 m/s.)
 #[test]
+#[ignore = "long"]
 fn a_tank_carries_its_water_along() {
     let stirred = |method: &str, motion: &str, velocity: [&str; 3]| {
         let [u, v, w] = velocity;
@@ -170,6 +172,7 @@ fn piston(method: &str, speed: f64, until: f64) -> String {
 }
 
 #[test]
+#[ignore = "long"]
 fn a_piston_that_passes_a_stone_leaves_nothing_inside() {
     for method in ["paper", "wcsph", "dfsph"] {
         // at its end the piston has pushed halfway over the stone; above it there is room
@@ -180,6 +183,7 @@ fn a_piston_that_passes_a_stone_leaves_nothing_inside() {
 }
 
 #[test]
+#[ignore = "long"]
 fn walls_that_leave_no_room_end_the_run_and_say_so() {
     // the piston goes on to the right wall, and nothing is left of the box
     for method in ["paper", "wcsph", "dfsph"] {
@@ -344,6 +348,7 @@ scene carry {
 /// volume, the closed forms of the bent faces of a ball three spacings in radius threw particles away at 7
 /// m/s.
 #[test]
+#[ignore = "long"]
 fn a_shape_that_hardly_changes_leaves_water_at_rest() {
     let fastest = |change: &str| {
         let simulation = run(&format!(

@@ -125,6 +125,7 @@ scene start {{
 /// Thin blades take few sites of a lattice. With 3000 particles a lattice whose last layer did not fit was chosen, and
 /// all other layers were 8 % too dense.
 #[test]
+#[ignore = "long"]
 fn a_number_of_particles_fills_a_pool_to_its_top() {
     for number in [3000, 2000, 4400] {
         let text = format!(
@@ -242,6 +243,7 @@ fn a_fluid_that_fills_its_vessel_is_packed() {
 /// A rod that shakes in a full vessel carries the mass of water that potential flow gives, πρa²(b² + a²)/(b² − a²) for
 /// each metre. (Displaced particles used to close gaps first, and it felt 1 % of that.)
 #[test]
+#[ignore = "long"]
 fn a_body_in_a_full_vessel_meets_its_water() {
     let text = "rfm 1
 solid rod = cylinder(0.1, 2).move([0.01*(1 - cos(10*t)), 0, -1])
@@ -279,6 +281,7 @@ scene shake {
 
 /// In a full vessel differences of pressure are those of the whole weight, and the vessel bears all of it.
 #[test]
+#[ignore = "long"]
 fn a_full_vessel_weighs_what_its_shape_weighs() {
     let text = "rfm 1
 solid pot = cylinder(0.3, 2).move([0, 0, -1])

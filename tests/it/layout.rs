@@ -71,6 +71,7 @@ fn files(folder: &Path, found: &mut Vec<std::path::PathBuf>) {
 }
 
 #[test]
+#[ignore = "long"]
 fn every_file_here_keeps_its_meaning() {
     let mut paths = Vec::new();
     for folder in ["examples", "tests/cases", "src/lower", "src/cli/init", "tests/peers"] {
@@ -109,6 +110,7 @@ fn every_example_is_laid_out() {
 }
 
 #[test]
+#[ignore = "long"]
 fn random_programs_keep_their_meaning_and_their_comments() {
     let count = std::env::var("RFM_PROGRAMS").ok().map_or(FEW, |n| n.parse().unwrap());
     let (mut compiled, mut commented) = (0, 0);

@@ -47,6 +47,7 @@ fn compare(here: &Path, name: &str) {
 }
 
 #[test]
+#[ignore = "long"]
 fn pictures_look_as_they_were_seen_to_look() {
     let folder = tempfile::tempdir().unwrap();
     let here = folder.path();
@@ -83,6 +84,7 @@ fn pictures_look_as_they_were_seen_to_look() {
 }
 
 #[test]
+#[ignore = "long"]
 fn surfaces_that_are_not_there_are_asked_for() {
     let folder = tempfile::tempdir().unwrap();
     let here = folder.path();

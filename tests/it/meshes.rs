@@ -70,6 +70,7 @@ fn sharp(name: &str, cells: usize) -> Quality {
 }
 
 #[test]
+#[ignore = "long"]
 fn sharp_meshes_of_pawn_and_bishop_are_within_a_small_part_of_a_cell() {
     for name in ["pawn", "bishop"] {
         for (cells, most) in [(128, 1.5e-3), (256, 4e-4)] {
@@ -248,6 +249,7 @@ fn beyond_rounded<const N: usize>(beyond: [f64; N], radius: f64) -> f64 {
 /// Searches for the surface end at rounding, which is larger than any fixed share of a cell far from the origin, or
 /// of the cells of a part of some micrometres.
 #[test]
+#[ignore = "long"]
 fn vertices_are_as_exact_as_coordinates_far_from_the_origin() {
     let round_box = |p: DVec3| {
         let beyond = (p - DVec3::new(0.5, 1.0, 1.5)).abs() - DVec3::new(0.4, 0.9, 1.4);

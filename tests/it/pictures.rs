@@ -47,6 +47,7 @@ fn shares(picture: &Path) -> [f64; 3] {
 }
 
 #[test]
+#[ignore = "long"]
 fn a_container_is_cut_open_unless_that_is_refused() {
     let folder = tempfile::tempdir().unwrap();
     let here = folder.path();
@@ -125,6 +126,7 @@ scene drop {
 }
 
 #[test]
+#[ignore = "long"]
 fn a_plane_within_a_face_shows_what_lies_outside_of_it() {
     let folder = tempfile::tempdir().unwrap();
     let text = "rfm 1\nsolid step = box([0, 0, 0], [1, 1, 0.2]) or cylinder(0.3, 0.6).move([0.5, 0.5, 0])\n";

@@ -166,6 +166,7 @@ fn colours_have_the_range_that_is_asked_for() {
 }
 
 #[test]
+#[ignore = "long"]
 fn the_surface_of_the_fluid_has_the_colours_of_particles_and_is_cut() {
     let folder = tempfile::tempdir().unwrap();
     let here = folder.path();

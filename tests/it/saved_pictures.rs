@@ -111,6 +111,7 @@ fn said(here: &Path, folder: &str) -> String {
 }
 
 #[test]
+#[ignore = "long"]
 fn what_a_run_lacks_is_named() {
     let folder = tempfile::tempdir().unwrap();
     let here = folder.path();

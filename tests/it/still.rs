@@ -172,6 +172,7 @@ scene calm {
 /// (Without that share the pressure would be a tenth of a layer too high, 2 %; were the diffusion of
 /// densities not to know of the weight, 8 %.)
 #[test]
+#[ignore = "long"]
 fn walls_bear_their_share_under_any_gravity() {
     let mut simulation = simulation(
         "rfm 1
@@ -199,6 +200,7 @@ scene rest {
 /// A block that has fallen into its tank comes to rest as deep as its volume says, and presses as its weight
 /// does. (With `wcsph` it stood 15 % too high, and pressed 29 % too much at a third of its depth.)
 #[test]
+#[ignore = "long"]
 fn water_that_has_splashed_fills_no_more_than_its_volume() {
     for method in ["wcsph", "dfsph"] {
         let mut simulation = simulation(&format!(

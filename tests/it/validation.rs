@@ -94,6 +94,7 @@ fn every_flow_checks_without_a_word() {
 }
 
 #[test]
+#[ignore = "long"]
 fn water_at_rest_bears_its_own_weight() {
     // twenty layers: half a layer at the surface is 2.5 % of the depth; forty layers deviate by 0.7 %
     pressure_within("hydrostatic_box", 500.0, 0.04);
@@ -114,6 +115,7 @@ fn water_over_a_pawn_stays_out_of_it() {
 }
 
 #[test]
+#[ignore = "long"]
 fn a_splash_makes_no_energy_and_keeps_its_volume() {
     for method in ["wcsph", "dfsph"] {
         let simulation = advanced("closed_tank", method, &[("particles", 1000.0)], 2.5);
@@ -130,6 +132,7 @@ fn a_splash_makes_no_energy_and_keeps_its_volume() {
 }
 
 #[test]
+#[ignore = "long"]
 fn still_water_comes_to_rest() {
     for method in ["wcsph", "dfsph"] {
         let simulation = advanced("still_water", method, &[("layers", 8.0)], 6.0);
@@ -192,6 +195,7 @@ fn a_turning_cylinder_takes_the_fluid_along() {
 }
 
 #[test]
+#[ignore = "long"]
 fn friction_holds_back_a_turning_cylinder() {
     // five spacings across the gap: both walls are within the support radius of some particles
     let program = program("couette", &[("particles", 942.0)]);
@@ -381,6 +385,7 @@ fn a_channel_that_closes_on_itself_has_its_profile() {
 /// A block of water flies into the corner of a plate and a floor, along which it slides or at which it
 /// sticks. Nothing else acts on it, so that both together take what it loses.
 #[test]
+#[ignore = "long"]
 fn obstacles_take_the_momentum_that_the_fluid_loses() {
     for (method, fluid, walls) in [
         ("wcsph", "", "free_slip"),
@@ -475,6 +480,7 @@ fn forces_on_bodies_are_those_of_momentum_and_of_archimedes() {
 }
 
 #[test]
+#[ignore = "long"]
 fn a_drop_swings_at_the_frequency_of_its_tension() {
     let mut stretch = Vec::new();
     watch("oscillating_drop", &[("particles", 2000.0)], |_, simulation| {
@@ -509,6 +515,7 @@ fn a_drop_swings_at_the_frequency_of_its_tension() {
 }
 
 #[test]
+#[ignore = "long"]
 fn the_lowest_standing_wave_has_its_period() {
     let mut moments = Vec::new();
     let [_, _] = watch("standing_wave", &[("particles", 1800.0)], |_, simulation| {

@@ -124,6 +124,7 @@ scene s {{
 /// A hollow ball that turns and takes honey along. All of the angular momentum that the honey gains comes from the ball,
 /// in part by a couple: forces at the places of the particles would be some percent too large.
 #[test]
+#[ignore = "long"]
 fn a_turning_vessel_gives_what_the_honey_gets() {
     // wcsph gives half of a force now and half with the next one, and here forces fade
     for (method, keys, within) in [("dfsph", "", 1e-3), ("wcsph", ", gradients: pairs", 0.02)] {

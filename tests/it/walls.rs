@@ -170,6 +170,7 @@ fn a_wall_takes_along_what_lies_still() {
 }
 
 #[test]
+#[ignore = "long"]
 fn a_turning_blade_stays_free_of_water() {
     stays_free(STIRRED);
 }

@@ -220,6 +220,7 @@ fn c_of_random_solids_has_the_bits_of_rfm() {
 }
 
 #[test]
+#[ignore = "long"]
 fn c_of_all_examples_has_the_bits_of_rfm() {
     for compiler in compilers() {
         let counts = compare_c(compiler, &short_examples(), FEW);
