@@ -1,5 +1,6 @@
 //! Functions that are operations of the graph rather than text of the prelude.
 
+use super::dimensions::is_foreign_quantity;
 use super::lowering::Lowering;
 use super::value::Value;
 use crate::diagnostic::{Code, Diagnostic, Span};
@@ -154,6 +155,10 @@ impl Lowering<'_> {
         match builtin.meaning {
             Meaning::Unevaluated(build) => build(self, arguments, span),
             Meaning::Value(build) => {
+                let angles = if builtin.name == "arc" && arguments.len() > 3 { &arguments[2..4] } else { &[] };
+                if !angles.iter().all(|a| !is_foreign_quantity(&a.value) || self.may_be_angle(&a.value)) {
+                    return Value::Failed;
+                }
                 self.values(arguments).map_or(Value::Failed, |values| build(self, &values, arguments, span))
             }
             Meaning::Unary(op) => {

@@ -8,7 +8,7 @@ use super::module::Module;
 use super::names::Names;
 use super::options::SetBy;
 use super::value::Value;
-use crate::diagnostic::{Code, Diagnostic, SourceId, Span};
+use crate::diagnostic::{Code, Diagnostic, Label, Severity, SourceId, Span};
 use crate::files::Files;
 use crate::ir::{Axis, Binary, Expr as Operation, Node, Unary};
 use crate::quantity::Dimension;
@@ -141,11 +141,36 @@ impl Lowering<'_> {
 
     /// Reports once for each place; messages about no place in particular all come through.
     pub fn report(&mut self, diagnostic: Diagnostic) {
-        let diagnostic = self.in_users_text(diagnostic);
+        let mut diagnostic = self.in_users_text(diagnostic);
+        if diagnostic.severity == Severity::Error && diagnostic.code == Code::OUT_OF_RANGE {
+            self.take_over_what_explains(&mut diagnostic);
+        }
         let span = diagnostic.primary.span;
         if span.range().is_empty() || self.reported.insert((diagnostic.code.0, span)) {
             self.diagnostics.push(diagnostic);
         }
+    }
+
+    /// Makes a warning about a part of a value, such as a divisor that is zero, part of the error that the value cannot
+    /// be: both are one mistake, and the warning says what to write.
+    fn take_over_what_explains(&mut self, error: &mut Diagnostic) {
+        let at = error.primary.span;
+        let explains = |other: &Diagnostic| {
+            let part = other.primary.span;
+            other.severity == Severity::Warning
+                && [Code::UNDEFINED_VALUE, Code::LARGE_ANGLE].contains(&other.code)
+                && part.source == at.source
+                && at.start <= part.start
+                && part.end <= at.end
+        };
+        let Some(found) = self.diagnostics.iter().rposition(explains) else { return };
+        let warning = self.diagnostics.remove(found);
+        match warning.primary.span == at {
+            true => error.primary.text = warning.message,
+            false => error.secondary.push(Label { span: warning.primary.span, text: warning.message }),
+        }
+        error.help = warning.help;
+        error.edit = warning.edit;
     }
 
     /// A message about a place in the standard solids, moved to the call that led there, because the user can

@@ -414,7 +414,20 @@ impl Lowering<'_> {
             Some(Dimension::LENGTH) => {
                 ("a length is not an angle".into(), "write an angle such as `45 deg` or `0.8 rad`".into())
             }
-            // a number with such a unit is no value of a shape, which is reported
+            // a number with such a unit is no value of a shape, and a name for it is needed
+            Some(Dimension::TURN_RATE) if matches!(inner.kind, ExprKind::Quantity { .. }) => (
+                format!("`{written}` is a rate of turning, not an angle"),
+                format!(
+                    "write `param w = {written}` above, and `{sign}w*t` here for a shape that turns as time passes"
+                ),
+            ),
+            Some(Dimension::FREQUENCY) if matches!(inner.kind, ExprKind::Quantity { .. }) => (
+                format!("`{written}` is a rate, not an angle"),
+                format!(
+                    "write `param w = {written}` above, and `{sign}2*pi*w*t` here for a shape that turns so often in a \
+                     second"
+                ),
+            ),
             Some(Dimension::TURN_RATE) if matches!(inner.kind, ExprKind::Name(_)) => (
                 format!("`{written}` is a rate of turning, not an angle"),
                 format!("write `{sign}{written}*t` for a shape that turns as time passes"),

@@ -205,11 +205,17 @@ impl<'a> Lowering<'a> {
             };
             let (parameter, kind) = parameters[slot];
             let measure = kind.measure(parameter);
-            if kind != ParameterKind::Angle
-                && is_foreign_quantity(&argument.value)
-                && !self.measures(&argument.value, measure)
-            {
-                return Value::Failed;
+            if is_foreign_quantity(&argument.value) {
+                let may_stand_here = match kind {
+                    ParameterKind::Angle => self.may_be_angle(&argument.value),
+                    ParameterKind::Vector
+                    | ParameterKind::LocalAngle
+                    | ParameterKind::Length
+                    | ParameterKind::Factor => self.measures(&argument.value, measure),
+                };
+                if !may_stand_here {
+                    return Value::Failed;
+                }
             }
             let value = self.expr(&argument.value);
             if kind != ParameterKind::Angle
