@@ -1,7 +1,7 @@
 // The syntax of .rfm files for tree-sitter. The definition is ../rfm.pest; tests/it/editors.rs compares their words.
 
 const ITEMS = ["import", "param", "let", "fn", "solid", "scene"];
-const FOLDS = ["any", "all", "sum", "product", "min", "max"];
+const FOLDS = ["any", "all", "sum", "product", "min", "max", "list"];
 const UNITS = [
   "kPa", "MPa", "mPa", "Pa", "deg", "rad", "rpm", "min", "mm", "cm", "km", "um", "µm", "μm", "kg", "kJ", "kN", "mN",
   "ms", "us", "Hz", "N", "J", "m", "g", "s", "h", "°",
@@ -44,7 +44,7 @@ module.exports = grammar({
     block: ($) => seq(field("key", $._key), optional(field("label", $.name)), $._entries),
     setting: ($) => seq(field("key", $._key), ":", field("value", $._expression)),
     // words that begin a fold or a call are names elsewhere
-    _name: ($) => choice($.name, ...["sum", "product", "min", "max"].map((word) => alias(word, $.name))),
+    _name: ($) => choice($.name, ...["sum", "product", "min", "max", "list"].map((word) => alias(word, $.name))),
     // a key may be spelled like a keyword
     _key: ($) => choice($.name, ...[...ITEMS, ...FOLDS].map((word) => alias(word, $.name))),
 

@@ -509,7 +509,7 @@ fn number(name: &str, a: &[&str]) -> Option<Words> {
             [start, end] => written("a range is written with dots", &format!("{start}..{end}")),
             _ => written("a fold here", "any i in 0..6: sphere(0.3).move([i, 0, 0])"),
         },
-        "linspace" => written("a fold here", "any i in 0..6: sphere(0.3).move([i, 0, 0])"),
+        "linspace" | "arange" => written("a list of a fold here", "list i in 0..6: i/5"),
         "sum" | "product" | "total" => {
             words("a fold here", "write `sum i in 0..6: e`, or `sum e in [1, 2, 3]: e`")
         }

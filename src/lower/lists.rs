@@ -1,4 +1,4 @@
-//! Lists and folds: `[a, b, …]`, `list[i]`, `any i in 0..6: …`, `sum p in list: …`.
+//! Lists and folds: `[a, b, …]`, `list[i]`, `any i in 0..6: …`, `sum p in points: …`, `list i in 0..6: …`.
 
 use std::sync::Arc;
 
@@ -27,12 +27,17 @@ impl Lowering<'_> {
         if values.contains(&Value::Failed) {
             return Value::Failed;
         }
-        if let Some(text) = values.iter().position(|value| matches!(value, Value::Text(_))) {
-            let message = "a list holds numbers, vectors and lists, found a text";
-            return self.fail(Diagnostic::error(Code::WRONG_TYPE, parts[text].span, message));
-        }
         if self.over_budget(span) {
             return Value::Failed;
+        }
+        self.listed(values, |member| parts[member].span, span)
+    }
+
+    /// The list of some members, or the vector if they are three numbers. `place` tells where a member is written.
+    fn listed(&mut self, values: Vec<Value>, place: impl Fn(usize) -> Span, span: Span) -> Value {
+        if let Some(text) = values.iter().position(|value| matches!(value, Value::Text(_))) {
+            let message = "a list holds numbers, vectors and lists, found a text";
+            return self.fail(Diagnostic::error(Code::WRONG_TYPE, self.user_span(place(text)), message));
         }
         match values[..] {
             [Value::Number(a), Value::Number(b), Value::Number(c)] => Value::Vector([a, b, c]),
@@ -123,7 +128,7 @@ impl Lowering<'_> {
             }
             results.push(result);
         }
-        self.folded(op, &results, (body, span))
+        self.folded(op, results, (variable, members), (body, span))
     }
 
     /// The numbers of a range `start..end`.
@@ -210,24 +215,62 @@ impl Lowering<'_> {
     }
 
     /// What a fold makes of its members.
-    fn folded(&mut self, op: Fold, results: &[Value], (body, span): (&Expr, Span)) -> Value {
-        let Some((first, rest)) = results.split_first() else {
-            return Value::Number(self.constant(if op == Fold::Product { 1.0 } else { 0.0 }));
+    fn folded(
+        &mut self,
+        op: Fold,
+        results: Vec<Value>,
+        head: (&Name, &Members),
+        (body, span): (&Expr, Span),
+    ) -> Value {
+        let join: fn(&mut Self, &[Node], Span) -> Node = match op {
+            Fold::List => return self.listed(results, |_| body.span, span),
+            Fold::Sum => return self.added(&results, (body, span)),
+            Fold::Any => |lowering, nodes, span| lowering.balanced(Logic::Or, nodes, span),
+            Fold::All => |lowering, nodes, span| lowering.balanced(Logic::And, nodes, span),
+            Fold::Min => |lowering, nodes, span| lowering.chain(Binary::Min, nodes, span),
+            Fold::Max => |lowering, nodes, span| lowering.chain(Binary::Max, nodes, span),
+            // a product of none is 1
+            Fold::Product if results.is_empty() => return Value::Number(self.constant(1.0)),
+            Fold::Product => |lowering, nodes, span| lowering.chain(Binary::Mul, nodes, span),
         };
-        if op == Fold::Sum {
-            self.warn_of_sum(body, span);
-            return rest.iter().fold(first.clone(), |sum, next| self.sum(Binary::Add, &sum, next, span));
+        if let Some(strange) = results.iter().find(|value| !matches!(value, Value::Number(_))) {
+            let diagnostic = self.not_joined(op, strange, head, body);
+            return self.fail(diagnostic);
         }
-        let nodes: Option<Vec<Node>> =
-            results.iter().map(|value| self.as_number(value, self.origin(body))).collect();
-        let Some(nodes) = nodes else { return Value::Failed };
-        Value::Number(match op {
-            Fold::Any => self.balanced(Logic::Or, &nodes, span),
-            Fold::All => self.balanced(Logic::And, &nodes, span),
-            Fold::Min => self.chain(Binary::Min, &nodes, span),
-            Fold::Max => self.chain(Binary::Max, &nodes, span),
-            Fold::Product | Fold::Sum => self.chain(Binary::Mul, &nodes, span),
-        })
+        let numbers = results.iter().map(|value| self.as_number(value, self.origin(body)));
+        let Some(nodes) = numbers.collect::<Option<Vec<Node>>>() else { return Value::Failed };
+        Value::Number(join(self, &nodes, span))
+    }
+
+    /// The sum of the members of a fold, which may be vectors; 0 of none.
+    fn added(&mut self, results: &[Value], (body, span): (&Expr, Span)) -> Value {
+        let Some((first, rest)) = results.split_first() else { return Value::Number(self.constant(0.0)) };
+        self.warn_of_sum(body, span);
+        rest.iter().fold(first.clone(), |sum, next| self.sum(Binary::Add, &sum, next, span))
+    }
+
+    /// The message for a member that is no number, as in `any i in 0..60: [i, 0, 0]`, where a list is meant.
+    fn not_joined(
+        &self,
+        op: Fold,
+        member: &Value,
+        (variable, members): (&Name, &Members),
+        body: &Expr,
+    ) -> Diagnostic {
+        let what = if matches!(op, Fold::Any | Fold::All) { "shapes" } else { "numbers" };
+        let message = format!("`{}` is a fold of {what}, found {}", op.word(), member.describe());
+        let range = members.exprs().into_iter().map(|expr| self.written(expr)).collect::<Option<Vec<_>>>();
+        let written = match (range, self.written(body)) {
+            (Some(range), Some(body)) => format!("list {} in {}: {body}", variable.text, range.join("..")),
+            _ => "list i in 0..60: [cos(i), sin(i), i/60]".to_string(),
+        };
+        let diagnostic = Diagnostic::error(Code::WRONG_TYPE, self.user_span(self.origin(body)), message);
+        match member {
+            Value::Vector(_) | Value::List(_) => {
+                diagnostic.help(format!("for a list of the members, write `{written}`"))
+            }
+            Value::Number(_) | Value::Text(_) | Value::Failed => diagnostic,
+        }
     }
 }
 
@@ -237,5 +280,6 @@ fn of_none(op: Fold) -> &'static str {
         Fold::Any | Fold::All => "no shape would be left, and there is no formula for none",
         Fold::Min | Fold::Max => "no number is the least or greatest of none",
         Fold::Sum | Fold::Product => "a sum over none is 0 and a product 1",
+        Fold::List => "a list of none has no members",
     }
 }

@@ -246,7 +246,7 @@ impl Lowering<'_> {
         let Some(tolerance) = self.fineness(values.get(1).zip(arguments.get(1))) else {
             return Value::Failed;
         };
-        let points: Vec<DVec3> = spots.iter().map(|spot| spot.at).collect();
+        let points = through(&spots);
         let tolerance = tolerance.unwrap_or(FINENESS * extent(points.iter().copied()));
         match self.flaw_at(curves::spline(&points, tolerance), &spots) {
             Ok(chain) => self.curve(chain, dimensions, ("a spline", span)),
@@ -262,7 +262,7 @@ impl Lowering<'_> {
         let radius = self.above_zero(&values[1], &arguments[1], "the radius of corners");
         let tolerance = self.fineness(values.get(2).zip(arguments.get(2)));
         let (Some(radius), Some(tolerance)) = (radius, tolerance) else { return Value::Failed };
-        let points: Vec<DVec3> = spots.iter().map(|spot| spot.at).collect();
+        let points = through(&spots);
         let chain = curves::rounded(&points, radius, tolerance.unwrap_or(2.0 * radius * FINENESS));
         match self.flaw_at(chain, &spots) {
             Ok(chain) => self.curve(chain, dimensions, ("a rounded path", span)),
@@ -407,6 +407,19 @@ pub(super) fn is_joint(a: &Spot, b: &Spot, close: f64) -> bool {
 pub(super) fn is_closed(spots: &[Spot]) -> bool {
     let size = extent(spots.iter().map(|spot| spot.at));
     matches!(spots, [first, .., last] if first.at == last.at || is_joint(last, first, JOINT * size))
+}
+
+/// The points that a curve goes through. A last one that is the first but for rounding, as of a path that is computed
+/// from angles, closes it.
+fn through(spots: &[Spot]) -> Vec<DVec3> {
+    let mut points: Vec<DVec3> = spots.iter().map(|spot| spot.at).collect();
+    let close = JOINT * extent(points.iter().copied());
+    if let [first, _, _, .., last] = &mut points[..]
+        && first.distance(*last) <= close
+    {
+        *last = *first;
+    }
+    points
 }
 
 /// The longest side of the box around points.

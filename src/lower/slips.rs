@@ -40,6 +40,13 @@ impl Lowering<'_> {
                     parts.iter().map(|part| self.written(part).map(foreign::operand)).collect();
                 parts.map_or("a or b".to_string(), |parts| parts.join(" or "))
             }
+            (ExprKind::Fold { op: op @ Fold::List, body, .. }, _) => {
+                if !self.is_shape(body) {
+                    return None;
+                }
+                let written = self.written(expr).unwrap_or("list i in 0..6: …");
+                written.replacen(op.word(), Fold::Any.word(), 1)
+            }
             // three shapes are a vector, as `[x, y, z]` is
             (ExprKind::Name(name), Value::List(members)) => {
                 let is_shape =

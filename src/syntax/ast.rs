@@ -222,11 +222,14 @@ pub enum Fold {
     Product,
     Min,
     Max,
+    /// `list`: the members as a list.
+    List,
 }
 
 impl Fold {
     /// All of them.
-    pub const ALL_FOLDS: [Self; 6] = [Self::Any, Self::All, Self::Sum, Self::Product, Self::Min, Self::Max];
+    pub const ALL_FOLDS: [Self; 7] =
+        [Self::Any, Self::All, Self::Sum, Self::Product, Self::Min, Self::Max, Self::List];
 
     /// Its word in files.
     pub fn word(self) -> &'static str {
@@ -237,12 +240,13 @@ impl Fold {
             Self::Product => "product",
             Self::Min => "min",
             Self::Max => "max",
+            Self::List => "list",
         }
     }
 
-    /// Whether it has a value without members, as a sum is 0.
+    /// Whether it has a value without members, as a sum is 0 and a list is empty.
     pub fn has_value_of_none(self) -> bool {
-        matches!(self, Self::Sum | Self::Product)
+        matches!(self, Self::Sum | Self::Product | Self::List)
     }
 }
 

@@ -305,7 +305,7 @@ impl Scan {
 fn takes_the_rest(word: &str, from: &str) -> bool {
     match word {
         "any" | "all" | "if" => true,
-        "sum" | "product" | "min" | "max" => {
+        "sum" | "product" | "min" | "max" | "list" => {
             let rest = from[word.len()..].trim_start();
             rest.starts_with(|c: char| c.is_alphabetic() || c == '_')
         }

@@ -76,6 +76,11 @@ fn numbers_of_steps_and_functions() {
         ("[5, 6, 7, 8][2] + [5, 6, 7][0]", 12.0),
         ("([[1, 2], [3, 4]][1]*2 + [1, 1]).y", 9.0),
         ("count([[1, 2], [3, 4]]) + count([1, 2, 3])", 5.0),
+        ("(list i in 0..4: i^2)[3]", 9.0),
+        ("(list i in 1..4: i).y", 2.0),
+        ("(list i in 0..2: list j in 0..3: [i, j])[1][2].y", 2.0),
+        ("sum p in (list p in [[1, 2], [3, 4]]: 2*p): p.x*p.y", 28.0),
+        ("count(list i in 3..3: i)", 0.0),
     ] {
         assert_eq!(value(&format!("({expression}) + 0*x"), [0.0; 3]), expected, "{expression}");
     }
@@ -102,6 +107,37 @@ fn choices_are_written_in_two_ways() {
             let p = DVec3::from_array(point);
             assert_eq!(choice.omega_grad(p), call.omega_grad(p));
         }
+    }
+}
+
+#[test]
+fn a_list_that_is_made_by_a_fold_is_the_list_that_is_written() {
+    for (fold, written) in [
+        ("sweep(list i in 0..4: [i, i^2, 0], 0.2)", "sweep([[0, 0, 0], [1, 1, 0], [2, 4, 0], [3, 9, 0]], 0.2)"),
+        ("any p in (list i in 0..2: [i, 0, 1]): sphere(1, p)", "sphere(1, [0, 0, 1]) or sphere(1, [1, 0, 1])"),
+        // the word is a name where no fold begins
+        ("any list in [2]: sphere(list)", "sphere(2)"),
+    ] {
+        let [fold, written] = [fold, written].map(solid);
+        for point in [[0.3, -0.2, 0.1], [1.7, 3.4, 0.1], [1.2, 0.1, -0.5]] {
+            let p = DVec3::from_array(point);
+            assert_eq!(fold.omega_grad(p), written.omega_grad(p));
+        }
+    }
+    let named = Program::from_source("t.rfm", "rfm 1\nlet list = [1, 2]\nsolid s = sphere(list[1] + (sum e in list: e))\n");
+    assert_eq!(named.unwrap().solid("s").unwrap().omega(DVec3::ZERO), 2.5);
+}
+
+#[test]
+fn a_closed_path_of_computed_points_is_closed_but_for_rounding() {
+    let closed = solid("sweep(spline(list i in 0..13: [cos(i*30°), sin(i*30°), 0]), 0.1)");
+    let exact = solid("torus(1, 0.1)");
+    // an open spline has no bend at its ends
+    for degrees in [-15.0_f64, 0.0, 15.0, 100.0] {
+        let (sin, cos) = degrees.to_radians().sin_cos();
+        let p = DVec3::new(1.05 * cos, 1.05 * sin, 0.0);
+        let off = closed.omega(p) - exact.omega(p);
+        assert!(off.abs() < 2e-3, "{degrees}: {off}");
     }
 }
 

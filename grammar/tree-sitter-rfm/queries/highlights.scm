@@ -5,7 +5,7 @@
 (quantity) @number
 
 ["import" "as" "param" "let" "fn" "solid" "scene"] @keyword
-["and" "or" "not" "in" "if" "then" "else" "any" "all" "sum" "product" "min" "max"] @keyword.operator
+["and" "or" "not" "in" "if" "then" "else" "any" "all" "sum" "product" "min" "max" "list"] @keyword.operator
 ["∧" "∨" "¬" "∖" "\\" "&" "&&" "|" "||" "!" "<=" ">=" "≤" "≥" "<" ">" "+" "-" "−" "*" "/" "·" "×" "÷" "^" "²" "³" "=" ".."] @operator
 ["(" ")" "[" "]" "{" "}"] @punctuation.bracket
 ["," ":" "."] @punctuation.delimiter

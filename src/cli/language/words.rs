@@ -34,7 +34,7 @@ pub(in crate::cli) const ITEMS: [(&str, &str); 6] = [
 ];
 
 /// Words and names that have a meaning of their own between functions.
-pub(in crate::cli) const SIGNS: [(&str, &str); 15] = [
+pub(in crate::cli) const SIGNS: [(&str, &str); 16] = [
     ("x", "the first coordinate of the point, in m"),
     ("y", "the second coordinate of the point, in m"),
     ("z", "the third coordinate of the point, in m; upwards"),
@@ -52,6 +52,11 @@ pub(in crate::cli) const SIGNS: [(&str, &str); 15] = [
     ("product", "a fold by `*`: `product k in 1..4: k`"),
     ("min", "a fold as well: `min p in list: length(p - [x, y, z])`, the smallest of all members"),
     ("max", "a fold as well: `max p in list: p.z`, the largest of all members"),
+    (
+        "list",
+        "a fold that makes a list of its members: `list i in 0..9: [cos(i), sin(i), i/9]`, or of another list, \
+         `list p in path: 2*p`",
+    ),
     ("if", "a choice: `if closed == 1 then 1 cm else 2 cm`, between numbers, points or shapes"),
 ];
 

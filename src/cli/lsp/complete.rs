@@ -20,8 +20,8 @@ use crate::cli::language::{
     words::{self, Signature, is_of_a_word},
 };
 
-const OPERATORS: [&str; 12] =
-    ["and", "or", "not", "any", "all", "sum", "product", "min", "max", "if", "then", "else"];
+const OPERATORS: [&str; 13] =
+    ["and", "or", "not", "any", "all", "sum", "product", "min", "max", "list", "if", "then", "else"];
 
 fn item(label: impl Into<String>, kind: CompletionItemKind, about: &str) -> CompletionItem {
     let documentation = (!about.is_empty()).then(|| Documentation::String(about.to_string()));

@@ -7,7 +7,7 @@ use super::pieces::{bracketed, fits, last_number, last_word, parts, unclosed};
 use crate::diagnostic::{Code, Diagnostic, Span};
 
 /// What begins a fold.
-pub(super) const FOLDS: [&str; 6] = ["any", "all", "sum", "product", "min", "max"];
+pub(super) const FOLDS: [&str; 7] = ["any", "all", "sum", "product", "min", "max", "list"];
 
 /// Functions whose powers mathematics writes behind their names.
 const POWERS_OF: [&str; 9] = ["sin", "cos", "tan", "sinh", "cosh", "tanh", "log", "ln", "exp"];

@@ -77,7 +77,11 @@ impl Slip<'_> {
         if !(FOLDS.contains(&fold) || fold == "for") || variable.is_empty() {
             return None;
         }
-        let fold = if fold == "for" { "any" } else { fold };
+        let fold = match heads.strip_suffix("for").map(str::trim_end) {
+            Some(front) if front.ends_with('[') => "list",
+            Some(_) => "any",
+            None => fold,
+        };
         let body = behind.trim_start_matches([' ', ')', ':']);
         let body = match methods_behind(body) {
             Some((written, rest)) if rest.trim_start_matches(';').is_empty() => written,

@@ -57,6 +57,11 @@ pub(super) fn first_part(line: &str) -> &str {
 
 /// The bracket that a text opens last without closing it, if it is a round one.
 pub(super) fn unclosed(text: &str) -> Option<usize> {
+    last_open(text).filter(|(_, bracket)| *bracket == '(').map(|(at, _)| at)
+}
+
+/// The bracket that a text opens last without closing it, with its place.
+pub(super) fn last_open(text: &str) -> Option<(usize, char)> {
     let mut open = Vec::new();
     for (at, c) in text.char_indices() {
         match c {
@@ -65,7 +70,7 @@ pub(super) fn unclosed(text: &str) -> Option<usize> {
             _ => {}
         }
     }
-    open.last().filter(|(_, bracket)| *bracket == '(').map(|(at, _)| *at)
+    open.pop()
 }
 
 /// Where the round bracket ends that was open before a text.

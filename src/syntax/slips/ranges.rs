@@ -3,7 +3,7 @@
 use super::super::foreign;
 use super::Slip;
 use super::heads::FOLDS;
-use super::pieces::{bracketed, first_part, fits, last_part, last_word, parts, words};
+use super::pieces::{bracketed, first_part, fits, last_open, last_part, last_word, parts, words};
 use crate::diagnostic::Diagnostic;
 
 impl Slip<'_> {
@@ -182,9 +182,24 @@ impl Slip<'_> {
         match self.found {
             "step" | "by" => self.step_of_a_range(),
             "where" => self.value_behind_where(),
+            "for" => self.list_with_for(),
             "in" => self.fold_as_a_call().or_else(|| self.member_of_a_range()),
             _ => None,
         }
+    }
+
+    /// `[[i, 0, 0] for i in range(60)]`
+    fn list_with_for(&self) -> Option<Diagnostic> {
+        let line = self.on_its_line();
+        let (open, _) = last_open(line).filter(|(_, bracket)| *bracket == '[')?;
+        let body = line[open + 1..].trim();
+        let (variable, range) = first_part(self.after().lines().next()?).split_once(" in ")?;
+        let range = members(range.trim()).unwrap_or_else(|| range.trim().to_string());
+        let written = match fits(&[body, variable, &range]) {
+            true => format!("list {} in {range}: {body}", variable.trim()),
+            false => "list i in 0..6: …".to_string(),
+        };
+        Some(self.unexpected().help(format!("a list of members is a fold without brackets: write `{written}`")))
     }
 
     /// `any k in 0..5 step 2: sphere(0.1).move([k, 0, 0])`

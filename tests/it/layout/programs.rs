@@ -167,7 +167,7 @@ impl Writer {
             }
             3 => {
                 self.put("( ");
-                self.put_one(&["any", "all", "sum", "min", "max", "product"]);
+                self.put_one(&["any", "all", "sum", "min", "max", "product", "list"]);
                 self.put_one(&[
                     "i in 0 .. 2 :",
                     "i in 0..2:",

@@ -67,6 +67,13 @@ const TEXTS: &[&str] = &[
     "solid s = any r in 0..5 step 2: sphere(r=0.1).move([r, 0, 0])",
     "solid s = any(sphere(0.3).move([i, 0, 0]) for i in range(3))",
     "solid s = any(sphere(0.3).move([i, 0, 0]) for i in range(1, 3))",
+    "solid s = sweep([[i, i^2, 0] for i in range(5)], 0.1)",
+    "solid s = sweep([for (i = [0:4]) [i, i^2, 0]], 0.1)",
+    "let p = [any i in 0..60: [sin(i), cos(i), 0]]\nsolid s = sweep(p, 0.1)",
+    "let p = max q in [[1, 2], [3, 4]]: q\nsolid s = sphere(p[0])",
+    "solid s = list i in 0..4: sphere(0.3).move([i, 0, 0])",
+    "solid s = sphere(1) or (list i in 0..4: sphere(0.3).move([i, 0, 0]))",
+    "solid s = sweep(list i in 0..4: \"a\", 0.1)",
     "solid s = sin^2(x) + y^2 + z^2 <= 1 and box()",
     "solid s = sphere(1) and atan2(y, x) <= 45",
 ];
@@ -114,6 +121,26 @@ fn what_is_suggested_makes_the_solid_that_was_meant() {
             "let c = [1, 2, 3]\nlet d = [1, 1, 1]\nsolid s = box(center=c, size=d)",
             "box(center=c, size=d)",
             "box(c - d/2, c + d/2)",
+        ),
+        (
+            "solid s = sweep([[i, i^2, 0] for i in range(5)], 0.1)",
+            "[[i, i^2, 0] for i in range(5)]",
+            "list i in 0..5: [i, i^2, 0]",
+        ),
+        (
+            "solid s = sweep([for (i = [0:4]) [i, i^2, 0]], 0.1)",
+            "[for (i = [0:4]) [i, i^2, 0]]",
+            "list i in 0..5: [i, (i)^2, 0]",
+        ),
+        (
+            "let p = (any i in 0..60: [sin(i), cos(i), 0])\nsolid s = sweep(p, 0.1)",
+            "any i in 0..60: [sin(i), cos(i), 0]",
+            "list i in 0..60: [sin(i), cos(i), 0]",
+        ),
+        (
+            "solid s = list i in 0..4: sphere(0.3).move([i, 0, 0])",
+            "list i in 0..4: sphere(0.3).move([i, 0, 0])",
+            "any i in 0..4: sphere(0.3).move([i, 0, 0])",
         ),
         ("let parts = [sphere(1), box()]\nsolid s = parts", "parts", "any part in parts: part"),
         (
