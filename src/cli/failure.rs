@@ -12,6 +12,8 @@ pub(super) enum Failure {
     Findings,
     /// A wrong flag, or a file that cannot be read or written.
     Usage(String),
+    /// Flags that set params as the file does not allow, which has been printed already.
+    Params,
     /// A run whose numbers became useless.
     Numerical(String),
     /// The user stopped the command, and it ended in order.
@@ -31,6 +33,7 @@ impl Failure {
         match self {
             Self::ClosedPipe => ExitCode::SUCCESS,
             Self::Findings => ExitCode::from(1),
+            Self::Params => ExitCode::from(2),
             Self::Usage(message) => {
                 complain(&message);
                 ExitCode::from(2)

@@ -4,7 +4,10 @@
 use std::io::{Error, ErrorKind, IsTerminal, Read};
 use std::path::Path;
 
+use serde::Serialize;
+
 use super::failure::{Failure, note};
+use super::findings::{Message, message};
 use super::shared::Shared;
 use crate::cli::output::{self, Shown};
 use rfm::Program;
@@ -44,12 +47,14 @@ fn unreadable(path: &Path, error: &Error) -> Failure {
 
 /// The failure for a path at which there is neither a file nor a folder.
 pub(super) fn missing(path: &Path) -> Failure {
+    let with_ending =
+        Some(path.with_extension("rfm")).filter(|other| path.extension().is_none() && other.is_file());
     let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty());
     let beside = std::fs::read_dir(folder.unwrap_or(Path::new("."))).into_iter().flatten().flatten();
     let names: Vec<String> = beside.filter_map(|entry| entry.file_name().into_string().ok()).collect();
     let written = path.file_name().map_or(String::new(), |name| name.to_string_lossy().into_owned());
     let near = nearest(&written, names.iter().map(String::as_str));
-    let near = near.map(|name| path.with_file_name(name).shown());
+    let near = with_ending.or_else(|| near.map(|name| path.with_file_name(name))).map(|near| near.shown());
     let hint = near.map_or(String::new(), |near| format!("; did you mean `{near}`?"));
     Failure::usage(format!("there is no file `{}`{hint}", path.shown()))
 }
@@ -73,7 +78,13 @@ pub(super) fn check(shared: &Shared, source: Source, files: Files) -> Result<Pro
 
 /// Reads and checks a file, and prints its messages.
 pub(super) fn program(shared: &Shared, path: &Path) -> Result<Program, Failure> {
-    let source = read(path)?;
+    let source = match read(path) {
+        Ok(source) => source,
+        Err(unreadable) => {
+            refusal(shared, Vec::new())?;
+            return Err(unreadable);
+        }
+    };
     let files = files(shared, &source);
     match check(shared, source, files) {
         Ok(program) => {
@@ -81,17 +92,33 @@ pub(super) fn program(shared: &Shared, path: &Path) -> Result<Program, Failure> 
             Ok(program)
         }
         Err(diagnostics) => {
-            show(&diagnostics);
+            match shared.json {
+                true => refusal(shared, diagnostics.list.iter().map(|d| message(d, &diagnostics)).collect())?,
+                false => show(&diagnostics),
+            }
             Err(failure(&diagnostics))
         }
     }
+}
+
+/// The document of a command whose file is refused, as far as it is that of `rfm check`.
+#[derive(Serialize)]
+struct Refusal {
+    schema: u32,
+    ok: bool,
+    diagnostics: Vec<Message>,
+}
+
+/// Prints the document of a file that is refused, if documents are asked for.
+fn refusal(shared: &Shared, diagnostics: Vec<Message>) -> Result<(), Failure> {
+    if shared.json { output::json(&Refusal { schema: 1, ok: false, diagnostics }) } else { Ok(()) }
 }
 
 /// The failure of a file with errors, or of flags that set what the file does not allow.
 pub(super) fn failure(diagnostics: &Diagnostics) -> Failure {
     let errors = || diagnostics.list.iter().filter(|d| d.severity == rfm::diagnostic::Severity::Error);
     if errors().all(|d| d.code == Code::OVERRIDE) {
-        return Failure::usage("the params that are given do not fit the file");
+        return Failure::Params;
     }
     Failure::Findings
 }

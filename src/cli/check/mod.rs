@@ -66,7 +66,7 @@ fn watch(shared: &Shared, options: &Check) -> Result<(), Failure> {
             anstream::print!("\x1b[2J\x1b[H");
         }
         match once(shared, options, &mut named) {
-            Ok(()) | Err(Failure::Findings) => {}
+            Ok(()) | Err(Failure::Findings | Failure::Params) => {}
             Err(Failure::Usage(message)) => complain(&message), // the file may be back in a moment
             Err(other) => return Err(other),
         }
@@ -87,12 +87,13 @@ fn watch(shared: &Shared, options: &Check) -> Result<(), Failure> {
 /// Checks all files. `named` receives the paths of those that they name.
 fn once(shared: &Shared, options: &Check, named: &mut Vec<PathBuf>) -> Result<(), Failure> {
     let mut document = Document { schema: 1, ok: true, diagnostics: Vec::new(), solids: Vec::new() };
-    let mut usage = None;
+    let (mut usage, mut fits) = (None, true);
     for path in &options.files {
         match check_file(shared, options, path, &mut document, named) {
             Ok(()) => {}
             // the other files have their messages
             Err(Failure::Findings) => document.ok = false,
+            Err(Failure::Params) => (document.ok, fits) = (false, false),
             Err(Failure::Usage(message)) => {
                 document.ok = false;
                 if let Some(earlier) = usage.replace(message) {
@@ -108,6 +109,7 @@ fn once(shared: &Shared, options: &Check, named: &mut Vec<PathBuf>) -> Result<()
     findings::write(&document.diagnostics, options.message_format)?;
     match usage {
         Some(message) => Err(Failure::Usage(message)),
+        None if !fits => Err(Failure::Params),
         None if document.ok => Ok(()),
         None => Err(Failure::Findings),
     }

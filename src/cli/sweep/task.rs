@@ -156,6 +156,7 @@ impl Task<'_> {
         let (exit, failure) = match &result {
             Ok(()) => (0, None),
             Err(Failure::Findings) => (1, Some(first_error(&documents))),
+            Err(Failure::Params) => (2, Some(first_error(&documents))),
             Err(Failure::Usage(message)) => (2, Some(message.clone())),
             Err(Failure::Numerical(message)) => (3, Some(message.clone())),
             Err(Failure::Interrupted | Failure::ClosedPipe) => (130, Some("interrupted".into())),

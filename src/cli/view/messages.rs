@@ -18,6 +18,8 @@ pub(super) fn refused(error: Error) -> String {
 pub(super) fn message(failure: Failure) -> String {
     match failure {
         Failure::Usage(message) | Failure::Numerical(message) => message,
-        Failure::Findings | Failure::Interrupted | Failure::ClosedPipe => "the file has mistakes".into(),
+        Failure::Findings | Failure::Params | Failure::Interrupted | Failure::ClosedPipe => {
+            "the file has mistakes".into()
+        }
     }
 }
