@@ -25,6 +25,19 @@ impl Watch for Deadline {
     }
 }
 
+/// Work whose progress another watch shows, and that ends at a deadline.
+pub struct Within<'a>(pub &'a dyn Watch, pub Deadline);
+
+impl Watch for Within<'_> {
+    fn progress(&self, done: f64) {
+        self.0.progress(done);
+    }
+
+    fn is_over(&self) -> bool {
+        self.1.is_over()
+    }
+}
+
 /// Work whose progress is shown, and that ends at a deadline if there is one.
 pub struct Shown<'a>(pub &'a Progress, pub Option<Deadline>);
 

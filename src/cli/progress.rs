@@ -3,11 +3,14 @@
 
 use std::io::IsTerminal;
 use std::sync::Mutex;
-use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::time::{Duration, Instant};
 
-use indicatif::{ProgressBar, ProgressStyle};
+use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use rfm::mesh::Watch;
+
+/// Work that is mostly over sooner shows no bar before.
+const MOMENT: Duration = Duration::from_millis(700);
 
 /// Work that is over sooner needs no lines.
 const FIRST_LINE: Duration = Duration::from_secs(3);
@@ -21,8 +24,10 @@ pub(super) struct Progress {
     /// Tenths of the work that are done and were printed.
     tenths: AtomicU64,
     message: Mutex<String>,
-    /// `None` where there is no terminal.
+    /// `None` where there is no terminal, and lines are printed.
     bar: Option<ProgressBar>,
+    /// Whether the bar is hidden until the work has lasted a moment.
+    is_late: AtomicBool,
 }
 
 /// The progress of work over `length` steps, with a text that the caller keeps up to date.
@@ -36,6 +41,14 @@ pub(super) fn shares(what: &'static str) -> Progress {
     bar(1000, what)
 }
 
+/// The progress of work that is mostly over at once, and reports shares of itself: a bar on a terminal if it lasts longer
+/// than a moment, and nothing elsewhere.
+pub(super) fn late_shares(what: &'static str) -> Progress {
+    let bar = ProgressBar::with_draw_target(Some(1000), ProgressDrawTarget::hidden());
+    let own = progress(1000, what, Some(bar));
+    Progress { is_late: std::io::stderr().is_terminal().into(), ..own }
+}
+
 fn progress(length: u64, what: &'static str, bar: Option<ProgressBar>) -> Progress {
     if let Some(bar) = &bar {
         let template = "{prefix:>10} {wide_bar:.cyan/blue} {percent:>3} %  {msg}  {elapsed} < {eta}";
@@ -47,7 +60,8 @@ fn progress(length: u64, what: &'static str, bar: Option<ProgressBar>) -> Progre
     }
     let (started, message) = (Instant::now(), Mutex::default());
     let position = AtomicU64::new(0);
-    Progress { what, length, started, position, tenths: AtomicU64::new(0), message, bar }
+    let (tenths, is_late) = (AtomicU64::new(0), AtomicBool::new(false));
+    Progress { what, length, started, position, tenths, message, bar, is_late }
 }
 
 impl Progress {
@@ -68,7 +82,12 @@ impl Progress {
 
     fn show(&self, position: u64) {
         match &self.bar {
-            Some(bar) => bar.set_position(position),
+            Some(bar) => {
+                if self.started.elapsed() >= MOMENT && self.is_late.swap(false, Ordering::Relaxed) {
+                    bar.set_draw_target(ProgressDrawTarget::stderr());
+                }
+                bar.set_position(position);
+            }
             None => self.tell(position),
         }
     }
@@ -119,6 +138,17 @@ impl Watch for Progress {
     }
 }
 
+/// Progress that never goes back, whatever part of the work reports it.
+pub(super) struct Forwards<'a>(pub &'a Progress);
+
+impl Watch for Forwards<'_> {
+    fn progress(&self, done: f64) {
+        let position = (self.0.length as f64 * done) as u64;
+        let before = self.0.position.fetch_max(position, Ordering::Relaxed);
+        self.0.show(position.max(before));
+    }
+}
+
 /// A duration of some seconds in a readable form: `45 s`, `12 min`, `3.4 h`, `12 days`.
 pub(super) fn duration(seconds: f64) -> String {
     match seconds {
@@ -127,19 +157,9 @@ pub(super) fn duration(seconds: f64) -> String {
         s if s < 7200.0 => format!("{:.0} min", s / 60.0),
         s if s < 172_800.0 => format!("{:.1} h", s / 3600.0),
         s if s < 3.15e8 => format!("{:.0} days", s / 86_400.0),
-        s => format!("{:.0} years", s / 3.156e7),
+        s if s < 3.156e11 => format!("{:.0} years", s / 3.156e7),
+        s => format!("{:.0e} years", s / 3.156e7),
     }
-}
-
-/// A spinner for work of unknown length.
-pub(super) fn spinner(what: &'static str) -> ProgressBar {
-    let spinner = ProgressBar::new_spinner();
-    if !std::io::stderr().is_terminal() {
-        spinner.set_draw_target(indicatif::ProgressDrawTarget::hidden());
-    }
-    spinner.set_message(what);
-    spinner.enable_steady_tick(Duration::from_millis(200));
-    spinner
 }
 
 #[cfg(test)]
@@ -158,8 +178,19 @@ mod tests {
     }
 
     #[test]
+    fn a_part_that_begins_anew_does_not_take_progress_back() {
+        let shares = late_shares("checking");
+        for done in [0.3, 0.7, 0.1] {
+            Forwards(&shares).progress(done);
+        }
+        assert_eq!(shares.position(), 700);
+        let shown = shares.bar.as_ref().map(|bar| (bar.position(), bar.length()));
+        assert_eq!(shown, Some((700, Some(1000))));
+    }
+
+    #[test]
     fn durations_have_the_unit_of_their_size() {
-        let shown = [0.2, 45.0, 600.0, 9e3, 9e5, 1e9].map(duration);
-        assert_eq!(shown, ["1 s", "45 s", "10 min", "2.5 h", "10 days", "32 years"]);
+        let shown = [0.2, 45.0, 600.0, 9e3, 9e5, 1e9, 3.5e15].map(duration);
+        assert_eq!(shown, ["1 s", "45 s", "10 min", "2.5 h", "10 days", "32 years", "1e8 years"]);
     }
 }

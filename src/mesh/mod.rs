@@ -84,7 +84,7 @@ pub use simplify::simplify;
 pub use slivers::remove_slivers;
 pub use thin::{ThinCells, thin_cells};
 pub use volume::{Volume, VolumeError, volume};
-pub use watch::{Unwatched, Watch};
+pub use watch::{Stretch, Unwatched, Watch};
 
 /// A triangle mesh with shared vertices.
 ///

@@ -27,7 +27,6 @@ use super::{
     patches::undecided_cells,
     prune::{BRICK, Bricks, Lattice},
     signs::{Brick, Signs, crossed_cells},
-    watch::Ends,
 };
 use crate::{field::Field, geom::Aabb};
 use edges::BrickEdges;
@@ -38,42 +37,46 @@ pub use found::ThinCells;
 /// Counts the cells of a grid in which [`marching_cubes`](super::marching_cubes) misses a part of the surface.
 ///
 /// The search takes as long as the surface is intricate. If `watch` ends it, what was found so far is
-/// returned, and [`ThinCells::ended`] says so. Progress is not reported.
+/// returned, and [`ThinCells::ended`] says so. It receives the share of the cells that were looked at.
 ///
 /// # Errors
 /// [`MeshError::NotANumber`] if ω is NaN at a node.
 pub fn thin_cells(field: &dyn Field, grid: &Grid, watch: &dyn Watch) -> Result<ThinCells, MeshError> {
     let lattice = Lattice::new(grid);
     let near = Bricks::classify(field, &lattice);
-    let quiet = Ends(watch);
-    let sampling = ProgressPart::new(near.near.len().div_ceil(BRICKS_PER_TASK), 0.0..1.0, &quiet);
+    let sampling = ProgressPart::new(near.near.len().div_ceil(BRICKS_PER_TASK), 0.0..SAMPLING, watch);
     let signs = match sample(field, &lattice, &near, &mut 0, &sampling) {
         Ok(signs) => signs,
         Err(MeshError::Ended) => return Ok(ThinCells::ENDED),
         Err(error @ (MeshError::NotANumber { .. } | MeshError::TooManyVertices { .. })) => return Err(error),
     };
     let cells = grid.cells();
+    let searching = ProgressPart::new(near.near.len(), SAMPLING..1.0, watch);
     let parts: Vec<ThinCells> = (0..near.near.len())
         .into_par_iter()
         .map(|number| {
             let brick = near.near[number];
-            if brick.solid {
-                return ThinCells::NONE;
-            }
-            if watch.is_over() {
-                return ThinCells::ENDED;
-            }
-            let around = Brick::new(&near, &signs, number).around(&signs);
-            let crossed = std::array::from_fn(|z| crossed_cells(&around.corners(z)));
-            let undecided = std::array::from_fn(|z| undecided_cells(&around.corners(z)));
-            let low = brick.at.map(|b| b * BRICK);
-            let edges = RefCell::new(BrickEdges::new(low));
-            Search { field, lattice: &lattice, low, cells, crossed, undecided, edges, watch }
-                .count([0; 3], BRICK)
+            let search = || {
+                if brick.solid {
+                    return ThinCells::NONE;
+                }
+                let around = Brick::new(&near, &signs, number).around(&signs);
+                let crossed = std::array::from_fn(|z| crossed_cells(&around.corners(z)));
+                let undecided = std::array::from_fn(|z| undecided_cells(&around.corners(z)));
+                let low = brick.at.map(|b| b * BRICK);
+                let edges = RefCell::new(BrickEdges::new(low));
+                Search { field, lattice: &lattice, low, cells, crossed, undecided, edges, watch }
+                    .count([0; 3], BRICK)
+            };
+            // a task fails only if the work is to end
+            searching.run(|| Ok(search())).unwrap_or(ThinCells::ENDED)
         })
         .collect();
     Ok(parts.into_iter().fold(ThinCells::NONE, ThinCells::and))
 }
+
+/// The share of the work that is done when the nodes have their signs.
+const SAMPLING: f64 = 0.1;
 
 /// The search for hidden surfaces in one brick.
 struct Search<'a> {

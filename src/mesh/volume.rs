@@ -7,8 +7,7 @@ use rayon::prelude::*;
 use rustc_hash::{FxHashMap, FxHashSet};
 
 use super::normals::gradients;
-use super::watch::Ends;
-use super::{Grid, GridError, Mesh, MeshError, Resolution, Watch, dual_contouring, shells};
+use super::{Grid, GridError, Mesh, MeshError, Resolution, Stretch, Watch, dual_contouring, shells};
 use crate::field::Field;
 use crate::geom::Aabb;
 
@@ -66,7 +65,7 @@ impl std::fmt::Display for VolumeError {
 impl std::error::Error for VolumeError {}
 
 /// Finds the volume of a solid on meshes with `cells` cells, two thirds and half as many along the longest
-/// side of its bounds. `watch` may end the work; progress is not reported.
+/// side of its bounds. `watch` receives the share of them that is made, and may end the work.
 ///
 /// # Errors
 /// [`VolumeError`] if one of the meshes cannot be made, or is empty.
@@ -76,16 +75,19 @@ pub fn volume(
     cells: usize,
     watch: &dyn Watch,
 ) -> Result<Volume, VolumeError> {
-    let measured = |cells| {
+    let measured = |cells, [from, to]: [f64; 2]| {
         let grid = Grid::around(bounds, Resolution::Cells(cells)).map_err(VolumeError::Grid)?;
-        let mesh = dual_contouring(field, &grid, &Ends(watch)).map_err(VolumeError::Mesh)?;
+        let mesh = dual_contouring(field, &grid, &Stretch { watch, from, to }).map_err(VolumeError::Mesh)?;
         Ok(Measured::of(field, &mesh, grid.spacing().min_element()))
     };
     if cells / 2 < Grid::MIN_CELLS {
         return Err(VolumeError::TooFewCells(cells));
     }
-    let (coarse, middle, fine): (Measured, Measured, Measured) =
-        (measured(cells / 2)?, measured(2 * cells / 3)?, measured(cells)?);
+    let [coarse, middle, fine]: [Measured; 3] = [
+        measured(cells / 2, [0.0, COARSE])?,
+        measured(2 * cells / 3, [COARSE, MIDDLE])?,
+        measured(cells, [MIDDLE, 1.0])?,
+    ];
     if fine.area == 0.0 {
         return Err(VolumeError::TooThin);
     }
@@ -102,6 +104,10 @@ pub fn volume(
         solids_coarser: coarse.solids,
     })
 }
+
+/// The shares of the work that are done with the coarser two of three meshes: it goes with the square of the cells.
+const COARSE: f64 = 0.15;
+const MIDDLE: f64 = 0.4;
 
 /// How far values of three meshes are apart, as an error of the finest one. Edges that no vertex has caught lie
 /// unevenly between the cells, so the whole difference is given. Sizes without a trend may agree by chance.
@@ -479,6 +485,25 @@ mod tests {
         let exact = 2.0 / 3.0 * std::f64::consts::PI;
         // the grid is a cell larger than the box
         assert!((found.volume - exact).abs() < 0.1 * exact, "{found:?}");
+    }
+
+    #[test]
+    fn three_meshes_and_the_search_for_thin_parts_report_one_progress_each() {
+        let shares = std::sync::Mutex::new(Vec::new());
+        let note = |done: f64| shares.lock().unwrap().push(done);
+        let bounds = Aabb::new(DVec3::splat(-1.0), DVec3::splat(1.0));
+        volume(&ball(0.9), &bounds, 48, &note).unwrap();
+        let found = std::mem::take(&mut *shares.lock().unwrap());
+        let most = found.iter().copied().fold(0.0, f64::max);
+        assert!(
+            most > 0.99 && most <= 1.0 && found.iter().filter(|done| **done < MIDDLE).count() > 2,
+            "{found:?}"
+        );
+        let grid = Grid::around(&bounds, Resolution::Cells(48)).unwrap();
+        crate::mesh::thin_cells(&ball(0.9), &grid, &note).unwrap();
+        let found = shares.into_inner().unwrap();
+        let most = found.iter().copied().fold(0.0, f64::max);
+        assert!(most > 0.99 && most <= 1.0 && found.len() > 10, "{found:?}");
     }
 
     #[test]

@@ -28,9 +28,12 @@ pub struct Unwatched;
 impl Watch for Unwatched {}
 
 /// A part of the work of another watch: from one share of it to another.
-pub(super) struct Stretch<'a> {
+pub struct Stretch<'a> {
+    /// The watch of all the work.
     pub watch: &'a dyn Watch,
+    /// The share of the work that is done before this part.
     pub from: f64,
+    /// The share that is done after it.
     pub to: f64,
 }
 
@@ -41,15 +44,5 @@ impl Watch for Stretch<'_> {
 
     fn is_over(&self) -> bool {
         self.watch.is_over()
-    }
-}
-
-/// Forwards the cancellation of another watch, but reports no progress to it, because each mesh is only a
-/// part of the work.
-pub(super) struct Ends<'a>(pub &'a dyn Watch);
-
-impl Watch for Ends<'_> {
-    fn is_over(&self) -> bool {
-        self.0.is_over()
     }
 }

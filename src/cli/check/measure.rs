@@ -7,7 +7,9 @@ use crate::cli::hidden::{knows_ranges, without_ranges};
 use rfm::Solid;
 use rfm::field::Field;
 use rfm::geom::{Aabb, to_thousandths};
-use rfm::mesh::{self, ByLines, Grid, Mesh, MeshError, Resolution, ThinCells, Volume, VolumeError, Watch};
+use rfm::mesh::{
+    self, ByLines, Grid, Mesh, MeshError, Resolution, Stretch, ThinCells, Volume, VolumeError, Watch,
+};
 use rfm::solid::Bounds;
 
 /// The most cells on three faces of the bounds with which a solid is measured that is too thin for the usual ones, 512
@@ -21,6 +23,9 @@ const HIDDEN_CELLS: f64 = 2.0;
 /// The part of the volume from which on its error tells of a part that coarser meshes have missed: of plates as thin as
 /// their cells, errors were a tenth of the volume and more.
 const MISSED_PART: f64 = 0.05;
+
+/// The share of the work that is done when the volume is known.
+const MESHES: f64 = 0.5;
 
 /// What rounding may add to the sums over triangles, relative to them.
 const ROUNDING: f64 = 1e-12;
@@ -69,14 +74,16 @@ pub(super) fn measure(
         tell_of_end(solid, thin, &mut facts, notes);
         return Ok((facts, thin.unwrap_or(ThinCells::NONE)));
     }
-    let by_meshes = by_meshes(&*surface, bounds, watch, &mut facts)?;
+    let meshing = Stretch { watch, from: 0.0, to: MESHES };
+    let searching = Stretch { watch, from: MESHES, to: 1.0 };
+    let by_meshes = by_meshes(&*surface, bounds, &meshing, &mut facts)?;
     if by_meshes == ByMeshes::Impossible {
         return Ok((facts, ThinCells::NONE));
     }
     let by_lines = || mesh::by_lines(&*surface, bounds, watch);
     // the search for thin parts follows slopes, of which a choice has none, and takes the longer for it
     let of_choices = (solid.may_choose() && knows_ranges(solid, grid.bounds())).then(by_lines).flatten();
-    let thin = thin_cells(solid, &*surface, &grid, watch, notes);
+    let thin = thin_cells(solid, &*surface, &grid, &searching, notes);
     tell_of_end(solid, thin, &mut facts, notes);
     facts.resolved = resolved(thin, &facts);
     // of a plate that lies between the nodes nothing is seen, but the search may have found it
@@ -356,6 +363,20 @@ mod tests {
     use super::*;
     use rfm::glam::DVec3;
     use rfm::{Engine, Program};
+
+    #[test]
+    fn measuring_reports_how_far_it_is() {
+        let program = Program::from_source("s.rfm", "rfm 1\nsolid s = sphere(1) and z <= 0.5\n").unwrap();
+        let solid = program.solid_with("s", Engine::Interpreter).unwrap();
+        let shares = std::sync::Mutex::new(Vec::new());
+        let note = |done: f64| shares.lock().unwrap().push(done);
+        measure(&solid, "s.rfm", &note, &mut Vec::new()).unwrap();
+        let shares = shares.into_inner().unwrap();
+        let count = |from: f64, to: f64| shares.iter().filter(|done| (from..=to).contains(*done)).count();
+        assert!(count(0.0, MESHES) > 10 && count(MESHES, 1.0) > 10, "{shares:?}");
+        assert_eq!(count(0.0, 1.0), shares.len());
+        assert!(shares.iter().any(|done| *done > 0.99));
+    }
 
     #[test]
     fn bounds_are_loose_if_the_mesh_ends_cells_before_them() {

@@ -11,16 +11,17 @@ use std::time::{Duration, Instant, SystemTime};
 use serde::Serialize;
 
 use super::args::{Check, MessageFormat};
-use super::deadline::Deadline;
+use super::deadline::{Deadline, Within};
 use super::failure::{Failure, complain, note, warn};
 use super::findings::{self, Message, message};
+use super::progress::Forwards;
 use super::shared::Shared;
-use super::{choose, input, lints, output, section};
+use super::{choose, input, lints, output, progress, section};
 use facts::{Box3, Facts, print};
 use measure::measure;
 use rfm::diagnostic::Diagnostics;
 use rfm::lower::NamedSolid;
-use rfm::mesh::ThinCells;
+use rfm::mesh::{Stretch, ThinCells, Watch};
 use rfm::solid::{Bounds, ProgramKind};
 use rfm::{Program, Solid};
 
@@ -31,6 +32,9 @@ struct Document {
     diagnostics: Vec<Message>,
     solids: Vec<Facts>,
 }
+
+/// The share of the work that is done when all solids are measured; then slips in their formulas are looked for.
+const MEASURED: f64 = 0.8;
 
 /// Seconds for each operation of a solid of many leaves: of ten thousand parts a minute was seen.
 const SECONDS_BY_LEAVES: f64 = 8e-5;
@@ -192,27 +196,36 @@ fn solids(
         names => names.iter().map(chosen).collect::<Result<_, _>>()?,
     };
     let (mut tried, mut are_all): (Vec<Tried<'_>>, bool) = (Vec::new(), true);
+    let bar = progress::late_shares("checking");
+    let forwards = Forwards(&bar);
+    let until = |number: usize| MEASURED * number as f64 / named_solids.len() as f64;
     for (number, &named) in named_solids.iter().enumerate() {
         let elapsed = start.elapsed().as_secs_f64();
         if is_over(number, named_solids.len(), elapsed, budget) {
-            note(left_out(&named_solids, number, elapsed, budget));
+            bar.suspend(|| note(left_out(&named_solids, number, elapsed, budget)));
             are_all = false;
             break;
         }
         let solid = program.solid_with(&named.name, shared.engine.into()).map_err(choose::usage)?;
         let seconds = share(budget - elapsed, named_solids.len() - number, budget);
-        tried.push(Tried::new((named, solid.at(options.time)), file, seconds, budget)?);
+        bar.set_message(named.name.clone());
+        let watch = Stretch { watch: &forwards, from: until(number), to: until(number + 1) };
+        tried.push(Tried::new((named, solid.at(options.time)), file, (seconds, budget), &watch)?);
     }
     // what the others have left is for those whose share was too small; of too many solids nothing is left
     let mut unfinished = tried.iter().filter(|tried| tried.is_unfinished()).count();
     for tried in tried.iter_mut().filter(|tried| are_all && tried.is_unfinished()) {
-        tried.again(file, share(budget - start.elapsed().as_secs_f64(), unfinished, 0.0))?;
+        tried.again(file, share(budget - start.elapsed().as_secs_f64(), unfinished, 0.0), &forwards)?;
         unfinished -= 1;
     }
     let (mut facts, mut searches) = (Vec::new(), lints::Searches::new());
-    for tried in tried {
+    let measured = tried.len();
+    for (number, tried) in tried.into_iter().enumerate() {
+        forwards.progress(MEASURED + (1.0 - MEASURED) * number as f64 / measured as f64);
+        bar.suspend(|| tried.notes.iter().for_each(|text| note(text)));
         facts.push(conclude(program, tried, &mut searches, diagnostics));
     }
+    bar.finish_and_clear();
     searches.tell();
     diagnostics
         .list
@@ -236,8 +249,8 @@ impl<'a> Tried<'a> {
     fn new(
         (named, solid): (&'a NamedSolid, Solid),
         file: &str,
-        seconds: f64,
-        budget: f64,
+        (seconds, budget): (f64, f64),
+        watch: &dyn Watch,
     ) -> Result<Self, Failure> {
         let operations = solid.graph(ProgramKind::Value).0.len();
         let mut notes = Vec::new();
@@ -250,7 +263,8 @@ impl<'a> Tried<'a> {
                 (Facts { bounds, empty, no_volume, ..Facts::unknown(&solid, file) }, None)
             }
             None => {
-                let (facts, thin) = measure(&solid, file, &Deadline::after(seconds), &mut notes)?;
+                let within = Within(watch, Deadline::after(seconds));
+                let (facts, thin) = measure(&solid, file, &within, &mut notes)?;
                 (facts, Some(thin))
             }
         };
@@ -262,10 +276,11 @@ impl<'a> Tried<'a> {
     }
 
     /// Measures it anew, if there is more time than before.
-    fn again(&mut self, file: &str, seconds: f64) -> Result<(), Failure> {
+    fn again(&mut self, file: &str, seconds: f64, watch: &dyn Watch) -> Result<(), Failure> {
         if seconds > self.seconds {
             self.notes.clear();
-            let (facts, thin) = measure(&self.solid, file, &Deadline::after(seconds), &mut self.notes)?;
+            let within = Within(watch, Deadline::after(seconds));
+            let (facts, thin) = measure(&self.solid, file, &within, &mut self.notes)?;
             (self.facts, self.thin, self.seconds) = (facts, Some(thin), seconds);
         }
         Ok(())
@@ -308,8 +323,7 @@ fn conclude(
     searches: &mut lints::Searches,
     diagnostics: &mut Diagnostics,
 ) -> Facts {
-    let Tried { named, solid, facts: mut found, thin, notes, .. } = tried;
-    notes.into_iter().for_each(note);
+    let Tried { named, solid, facts: mut found, thin, .. } = tried;
     found.tolerance = program.tolerance(&named.name).map(|tolerance| tolerance.value);
     let Some(thin) = thin else { return found };
     let tolerance = program.within_tolerance(&solid);

@@ -106,8 +106,8 @@ pub(super) fn simplified(
     let mut own = None;
     for aim in AIMS {
         let mut less = mesh.clone();
-        let (started, bar) = (Instant::now(), progress::spinner("simplifying"));
-        simplify(&mut less, distance, aim * tolerance);
+        let (started, bar) = (Instant::now(), progress::shares("simplifying"));
+        simplify(&mut less, distance, aim * tolerance, &bar);
         bar.finish_and_clear();
         simplifying += milliseconds(started);
         let quality = measure(&less, &mut measuring);

@@ -25,7 +25,7 @@ use std::collections::BinaryHeap;
 use glam::DVec3;
 
 use super::{
-    Mesh,
+    Mesh, Stretch, Watch,
     collapse::{Fans, compact},
     normals::{GradientColumns, unit},
     quality::nearest_point,
@@ -41,6 +41,12 @@ const PASSES: usize = 4;
 
 /// A pass that removes less than this part of the vertices is the last.
 const LEAST_GAIN: f64 = 0.01;
+
+/// The part of the work that is left after a pass.
+const LEFT_BY_A_PASS: f64 = 0.25;
+
+/// Edges between two looks at the watch.
+const PER_LOOK: usize = 1024;
 
 /// The cosine of the largest angle by which a triangle may turn.
 const LARGEST_TURN: f64 = 0.5;
@@ -60,7 +66,10 @@ const SPREAD: usize = 4;
 /// the number of vertices that it removed. Near the surface |ω| / |∇ω| must be about the distance from it.
 /// `tolerance` is in metres; one that is not positive changes nothing. Source: Garland and Heckbert, SIGGRAPH
 /// 1997, for the order of contractions.
-pub fn simplify(mesh: &mut Mesh, distance: &dyn Field, tolerance: f64) -> usize {
+///
+/// `watch` receives the share of the work that is done, as far as the edges that are left tell. If it ends the work, the
+/// mesh is within the tolerance all the same, and has more triangles.
+pub fn simplify(mesh: &mut Mesh, distance: &dyn Field, tolerance: f64, watch: &dyn Watch) -> usize {
     let before = mesh.positions.len();
     if tolerance.is_nan() || tolerance <= 0.0 || mesh.triangles.is_empty() {
         return 0;
@@ -82,14 +91,17 @@ pub fn simplify(mesh: &mut Mesh, distance: &dyn Field, tolerance: f64) -> usize 
         gradients: GradientColumns::default(),
     };
     let mut left = before;
-    for _ in 0..PASSES {
+    for pass in 0..PASSES {
         work.queue_all();
-        let taken = work.contract_all();
+        // each pass leaves about a quarter of the work to the ones after it
+        let [from, to] = [pass, pass + 1].map(|passes| 1.0 - LEFT_BY_A_PASS.powi(passes as i32));
+        let taken = work.contract_all(&Stretch { watch, from, to });
         left -= taken;
-        if (taken as f64) < LEAST_GAIN * left as f64 {
+        if (taken as f64) < LEAST_GAIN * left as f64 || watch.is_over() {
             break;
         }
     }
+    watch.progress(1.0);
     let Fans { is_lost, is_dead, .. } = work.fans;
     compact(mesh, &is_lost, &is_dead);
     before - mesh.positions.len()
@@ -243,10 +255,20 @@ impl Contraction<'_> {
         self.queue.push(Reverse(EdgeCandidate { cost, ends, versions }));
     }
 
-    /// Empties the queue. Returns the number of vertices that were removed.
-    fn contract_all(&mut self) -> usize {
-        let mut taken = 0;
+    /// Empties the queue, unless the watch ends the work. Returns the number of vertices that were removed.
+    fn contract_all(&mut self, watch: &dyn Watch) -> usize {
+        let (mut taken, mut tried, mut done) = (0, 0_usize, 0.0_f64);
         while let Some(Reverse(EdgeCandidate { ends, versions, .. })) = self.queue.pop() {
+            tried += 1;
+            if tried.is_multiple_of(PER_LOOK) {
+                if watch.is_over() {
+                    self.queue.clear();
+                    break;
+                }
+                // a contraction adds edges to those that wait
+                done = done.max(tried as f64 / (tried + self.queue.len()) as f64);
+                watch.progress(done);
+            }
             let is_fresh = (0..2).all(|i| {
                 let v = ends[i] as usize;
                 !self.fans.is_lost[v] && self.version[v] == versions[i]

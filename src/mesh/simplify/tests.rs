@@ -2,8 +2,8 @@
 
 use super::*;
 use crate::field::Closures;
+use crate::mesh::Unwatched;
 use crate::mesh::{Grid, Quality, Report, Resolution, check, dual_contouring, marching_cubes, measure};
-use crate::mesh::{Unwatched, Watch};
 
 type Mesher = fn(&dyn Field, &Grid, &dyn Watch) -> Result<Mesh, crate::mesh::MeshError>;
 
@@ -19,7 +19,7 @@ fn simplified(
     let grid = grid.unwrap();
     let mut mesh = mesher(field, &grid, &Unwatched).unwrap();
     let before = check(&mesh, field);
-    let taken = simplify(&mut mesh, field, tolerance);
+    let taken = simplify(&mut mesh, field, tolerance, &Unwatched);
     let after = check(&mesh, field);
     assert_eq!(before.vertices - after.vertices, taken);
     assert!(after.closed && after.manifold, "{after:?}");
@@ -108,12 +108,47 @@ fn no_tolerance_changes_nothing_and_the_same_mesh_gives_the_same_bits() {
     let mesh = marching_cubes(&ball(), &grid, &Unwatched).unwrap();
     for tolerance in [0.0, -1.0, f64::NAN] {
         let mut same = mesh.clone();
-        assert_eq!(simplify(&mut same, &ball(), tolerance), 0);
+        assert_eq!(simplify(&mut same, &ball(), tolerance, &Unwatched), 0);
         assert_eq!(same, mesh);
     }
-    assert_eq!(simplify(&mut Mesh::default(), &ball(), 1.0), 0);
+    assert_eq!(simplify(&mut Mesh::default(), &ball(), 1.0, &Unwatched), 0);
     let [mut one, mut two] = [mesh.clone(), mesh];
-    simplify(&mut one, &ball(), 0.01);
-    simplify(&mut two, &ball(), 0.01);
+    simplify(&mut one, &ball(), 0.01, &Unwatched);
+    simplify(&mut two, &ball(), 0.01, &Unwatched);
     assert_eq!(one, two);
+}
+
+/// Notes the shares that are reported, and ends the work at one of them.
+struct Until(f64, std::sync::Mutex<Vec<f64>>);
+
+impl Watch for Until {
+    fn progress(&self, done: f64) {
+        self.1.lock().unwrap().push(done);
+    }
+
+    fn is_over(&self) -> bool {
+        self.1.lock().unwrap().last().is_some_and(|done| *done >= self.0)
+    }
+}
+
+#[test]
+fn progress_ascends_and_work_that_is_ended_leaves_a_mesh_within_the_tolerance() {
+    let grid =
+        Grid::filling(&Aabb::new(DVec3::splat(-1.0), DVec3::splat(1.0)), Resolution::Cells(48)).unwrap();
+    let mesh = marching_cubes(&ball(), &grid, &Unwatched).unwrap();
+    let [(all, shares), (some, _)] = [2.0, 0.3].map(|end| {
+        let (mut less, watch) = (mesh.clone(), Until(end, std::sync::Mutex::default()));
+        simplify(&mut less, &ball(), 0.01, &watch);
+        (less, watch.1.into_inner().unwrap())
+    });
+    assert!(shares.len() > 3 && shares.is_sorted() && shares.last() == Some(&1.0), "{shares:?}");
+    assert!(
+        some.triangles.len() > 2 * all.triangles.len(),
+        "{} {}",
+        some.triangles.len(),
+        all.triangles.len()
+    );
+    assert!(some.triangles.len() < mesh.triangles.len());
+    let quality = measure(&some, &ball(), &ball(), &grid).unwrap();
+    assert!(quality.hausdorff() <= 0.0105, "{quality:?}");
 }
