@@ -142,7 +142,7 @@ impl<'a> Lowering<'a> {
                     continue;
                 }
                 Parameter::TooMany => {
-                    self.report_too_many(function, arguments.len(), argument);
+                    self.report_too_many(function, arguments, argument);
                     return None;
                 }
             };
@@ -155,7 +155,8 @@ impl<'a> Lowering<'a> {
                 self.expr(&argument.value);
             }
             if bound.iter().any(|local| local.name == parameter) {
-                let at = self.user_span(argument.value.span);
+                let at = argument.name.as_ref().map_or(argument.value.span, |name| name.span);
+                let at = self.user_span(at);
                 let message = format!("parameter `{parameter}` of `{name}` is given twice");
                 self.report(Diagnostic::error(Code::ARGUMENTS, at, message));
                 fits = false;
@@ -279,7 +280,8 @@ impl<'a> Lowering<'a> {
         Parameter::Unknown
     }
 
-    fn report_too_many(&mut self, function: &Function, found: usize, first: &Argument) {
+    fn report_too_many(&mut self, function: &Function, arguments: &[Argument], first: &Argument) {
+        let found = arguments.len();
         let most = function.parameters.len();
         let plural = if most == 1 { "" } else { "s" };
         let message =
@@ -288,10 +290,22 @@ impl<'a> Lowering<'a> {
         let diagnostic = Diagnostic::error(Code::ARGUMENTS, at, message).at("one too many");
         let signature = signature(function);
         // a rod between two points
-        let ends = matches!(&first.value.kind, ExprKind::Number(_)) && function.name.text == "capsule";
-        if ends && self.names.is_standard(self.scope.source, "capsule") {
-            let help = "a rod between two points is a tube: write `sweep([[0, 0, 0], [1, 0, 0]], 0.1)`";
-            self.report(diagnostic.help(help));
+        let between = matches!(arguments, [a, b, _] if [a, b].iter().all(|end| matches!(end.value.kind, ExprKind::Vector(_))));
+        let ends = match function.name.text.as_str() {
+            "capsule" => matches!(&first.value.kind, ExprKind::Number(_)),
+            "cylinder" => between,
+            _ => false,
+        };
+        if ends && self.names.is_standard(self.scope.source, &function.name.text) {
+            let written: Option<Vec<&str>> = arguments.iter().map(|a| self.written(&a.value)).collect();
+            let tube = match written.as_deref() {
+                Some([a, b, radius]) if between => format!("sweep([{a}, {b}], {radius})"),
+                _ => "sweep([[0, 0, 0], [1, 0, 0]], 0.1)".to_string(),
+            };
+            self.report(
+                diagnostic
+                    .help(format!("a rod between two points is a tube with round ends: write `{tube}`")),
+            );
             return;
         }
         self.report(diagnostic.help(match example(&function.name.text) {

@@ -155,7 +155,8 @@ impl Lowering<'_> {
         match builtin.meaning {
             Meaning::Unevaluated(build) => build(self, arguments, span),
             Meaning::Value(build) => {
-                let angles = if builtin.name == "arc" && arguments.len() > 3 { &arguments[2..4] } else { &[] };
+                let angles =
+                    if builtin.name == "arc" && arguments.len() > 3 { &arguments[2..4] } else { &[] };
                 if !angles.iter().all(|a| !is_foreign_quantity(&a.value) || self.may_be_angle(&a.value)) {
                     return Value::Failed;
                 }

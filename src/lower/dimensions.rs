@@ -137,6 +137,13 @@ impl Lowering<'_> {
 
     /// Whether two terms may be added, as far as their units tell. If not, this is reported.
     pub fn may_be_added(&mut self, first: &Expr, second: &Expr) -> bool {
+        for (angle, other) in [(first, second), (second, first)] {
+            if let ExprKind::Number(number) = other.kind
+                && self.dimension(angle) == Some(Dimension::ANGLE)
+            {
+                self.warn_of_large_angle(number, other);
+            }
+        }
         let (Some(a), Some(b)) = (self.dimension(first), self.dimension(second)) else { return true };
         let is_plain = a == Dimension::NONE || b == Dimension::NONE;
         if is_plain || a == b || (without_angle(a) == without_angle(b) && without_angle(a) != Dimension::NONE)

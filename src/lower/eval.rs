@@ -283,7 +283,10 @@ impl Lowering<'_> {
             _ => {
                 let span = self.user_span(span);
                 let message = format!("cannot add or subtract {} and {}", a.describe(), b.describe());
-                self.fail(Diagnostic::error(Code::WRONG_TYPE, span, message))
+                let diagnostic = Diagnostic::error(Code::WRONG_TYPE, span, message);
+                let moves = matches!((a, b), (Value::Number(shape), Value::Vector(_)) if self.depends_on_place(*shape));
+                let help = "a shape is moved by a method, as in `sphere(1).move([1, 0, 0])`";
+                self.fail(if moves { diagnostic.help(help) } else { diagnostic })
             }
         }
     }

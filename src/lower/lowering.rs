@@ -367,7 +367,7 @@ impl Lowering<'_> {
             let message = format!("`{function}` calls itself");
             self.report(
                 Diagnostic::error(Code::RECURSION, span, message)
-                    .help("use `any i in 0..n:` or `all i in 0..n:` for repetition"),
+                    .help("a fold repeats: `any i in 0..n: …` joins shapes, and `product i in 1..n + 1: i` multiplies numbers"),
             );
             return false;
         }

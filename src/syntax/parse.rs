@@ -9,7 +9,7 @@ use super::build;
 use super::code::CodeChars;
 use super::foreign;
 use super::grammar::{Grammar, Rule};
-use super::slips::Slip;
+use super::slips::{Slip, heads::begins_a_body};
 use super::words::{ITEM_WORDS, KEYWORDS, token_at};
 use crate::diagnostic::{Code, Diagnostic, Severity, Source, SourceId, Span};
 
@@ -81,12 +81,17 @@ fn recover(source: &Source, scan: &Scan, diagnostics: &mut Vec<Diagnostic>) -> A
     let mut starts = vec![0];
     starts.extend(scan.items.iter().copied().filter(|&at| at > 0));
     starts.push(text.len());
+    let mut in_a_body = false;
     for (i, pair) in starts.windows(2).enumerate() {
         let (start, end) = (pair[0], pair[1]);
+        let above = starts[i.saturating_sub(1)]..start;
+        in_a_body = begins_a_body(&text[above]) || in_a_body && is_indented(text, start);
         let rule = if i == 0 { Rule::file } else { Rule::items };
         match Grammar::parse(rule, &text[start..end]) {
             Ok(pairs) if i == 0 => ast.items.extend(build::file(source, pairs, diagnostics).items),
             Ok(pairs) => ast.items.extend(build::items(source, start, pairs, diagnostics)),
+            // the body of a function in several statements is one mistake
+            Err(_) if in_a_body => {}
             Err(error) => diagnostics.push(syntax_error(source, start, end, &error)),
         }
     }
@@ -97,6 +102,12 @@ fn recover(source: &Source, scan: &Scan, diagnostics: &mut Vec<Diagnostic>) -> A
         }
     }
     ast
+}
+
+/// Whether a place has nothing but blanks in front of it on its line, and some of them.
+fn is_indented(text: &str, at: usize) -> bool {
+    let line = text[..at].rsplit('\n').next().unwrap_or_default();
+    !line.is_empty() && line.chars().all(char::is_whitespace)
 }
 
 fn syntax_error(source: &Source, start: usize, end: usize, error: &Error<Rule>) -> Diagnostic {

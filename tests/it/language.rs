@@ -79,7 +79,7 @@ fn numbers_of_steps_and_functions() {
         ("(list i in 0..4: i^2)[3]", 9.0),
         ("(list i in 1..4: i).y", 2.0),
         ("(list i in 0..2: list j in 0..3: [i, j])[1][2].y", 2.0),
-        ("sum p in (list p in [[1, 2], [3, 4]]: 2*p): p.x*p.y", 28.0),
+        ("sum p in (list p in [[1, 2], [3, 4]]: 2*p): p.x*p.y", 56.0),
         ("count(list i in 3..3: i)", 0.0),
     ] {
         assert_eq!(value(&format!("({expression}) + 0*x"), [0.0; 3]), expected, "{expression}");
@@ -113,8 +113,14 @@ fn choices_are_written_in_two_ways() {
 #[test]
 fn a_list_that_is_made_by_a_fold_is_the_list_that_is_written() {
     for (fold, written) in [
-        ("sweep(list i in 0..4: [i, i^2, 0], 0.2)", "sweep([[0, 0, 0], [1, 1, 0], [2, 4, 0], [3, 9, 0]], 0.2)"),
-        ("any p in (list i in 0..2: [i, 0, 1]): sphere(1, p)", "sphere(1, [0, 0, 1]) or sphere(1, [1, 0, 1])"),
+        (
+            "sweep(list i in 0..4: [i, i^2, 0], 0.2)",
+            "sweep([[0, 0, 0], [1, 1, 0], [2, 4, 0], [3, 9, 0]], 0.2)",
+        ),
+        (
+            "any p in (list i in 0..2: [i, 0, 1]): sphere(1, p)",
+            "sphere(1, [0, 0, 1]) or sphere(1, [1, 0, 1])",
+        ),
         // the word is a name where no fold begins
         ("any list in [2]: sphere(list)", "sphere(2)"),
     ] {
@@ -124,7 +130,10 @@ fn a_list_that_is_made_by_a_fold_is_the_list_that_is_written() {
             assert_eq!(fold.omega_grad(p), written.omega_grad(p));
         }
     }
-    let named = Program::from_source("t.rfm", "rfm 1\nlet list = [1, 2]\nsolid s = sphere(list[1] + (sum e in list: e))\n");
+    let named = Program::from_source(
+        "t.rfm",
+        "rfm 1\nlet list = [1, 2]\nsolid s = sphere(list[1] + (sum e in list: e))\n",
+    );
     assert_eq!(named.unwrap().solid("s").unwrap().omega(DVec3::ZERO), 2.5);
 }
 

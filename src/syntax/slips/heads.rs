@@ -4,6 +4,7 @@ use super::super::foreign;
 use super::super::words::{ITEM_WORDS, KEYWORDS};
 use super::Slip;
 use super::pieces::{bracketed, fits, last_number, last_word, parts, unclosed};
+use super::ranges::replaced;
 use crate::diagnostic::{Code, Diagnostic, Span};
 
 /// What begins a fold.
@@ -16,7 +17,37 @@ const POWERS_OF: [&str; 9] = ["sin", "cos", "tan", "sinh", "cosh", "tanh", "log"
 const FUNCTIONS: [&str; 14] =
     ["sin", "cos", "tan", "asin", "acos", "atan", "sinh", "cosh", "tanh", "log", "ln", "exp", "sqrt", "abs"];
 
+/// Whether a text ends with the head of a function whose body would follow, on a line that is indented.
+pub(in crate::syntax) fn begins_a_body(text: &str) -> bool {
+    let Some((head, indent)) = text.rsplit_once('\n') else { return false };
+    let head = head.trim_end();
+    let is_head = head.trim_start().starts_with("fn ") && head.ends_with('=');
+    is_head && !indent.is_empty() && indent.chars().all(char::is_whitespace)
+}
+
 impl Slip<'_> {
+    /// A function whose body is several statements: `fn f(r) =`, `let q = r*2` and `sphere(q)` on lines of their own.
+    pub(super) fn body_of_statements(&self) -> Option<Diagnostic> {
+        let rest = self.text[self.at..].trim_start();
+        let above = &self.text[self.start.min(self.at)..self.text.len() - rest.len()];
+        if !self.found.is_empty() || !rest.starts_with("let ") || !begins_a_body(above) {
+            return None;
+        }
+        let mut lines = rest.lines().map(|line| line.split('#').next().unwrap_or_default().trim());
+        let (name, value) = lines.next()?.strip_prefix("let ")?.split_once('=')?;
+        let body = lines.next().unwrap_or_default();
+        let [name, value, head] = [name, value, above.trim()].map(str::trim);
+        let is_one = fits(&[name, value, head, body]) && !body.is_empty() && !body.starts_with("let ");
+        let written = match is_one {
+            true => format!("write `{head} {}`", replaced(body, name, value)),
+            false => "write the value of each `let` in the place of its name".to_string(),
+        };
+        Some(
+            self.syntax("a function is one expression")
+                .help(format!("a `let` stands above the functions: {written}")),
+        )
+    }
+
     /// A mark that stands where the head of something is written otherwise.
     pub(super) fn mark_in_a_head(&self) -> Option<Diagnostic> {
         match self.found {

@@ -199,7 +199,10 @@ impl Slip<'_> {
             true => format!("list {} in {range}: {body}", variable.trim()),
             false => "list i in 0..6: …".to_string(),
         };
-        Some(self.unexpected().help(format!("a list of members is a fold without brackets: write `{written}`")))
+        Some(
+            self.unexpected()
+                .help(format!("a list of members is a fold without brackets: write `{written}`")),
+        )
     }
 
     /// `any k in 0..5 step 2: sphere(0.1).move([k, 0, 0])`
