@@ -252,7 +252,7 @@ pub(super) struct Mesh {
     /// Contract edges as long as the mesh stays this near to the surface: a length as in 2mm, or a part of
     /// the mesh's diagonal as in 0.1%. The distance is measured; vertices stay on the surface. A mesh that is itself
     /// farther away stays as it is
-    #[arg(long, value_name = "ERROR", value_parser = tolerance, allow_negative_numbers = true)]
+    #[arg(long, value_name = "ERROR", value_parser = tolerance, allow_hyphen_values = true)]
     pub simplify: Option<Tolerance>,
     /// Time to look for what the mesh misses, in seconds or with a unit [default: 10 s, or three times that of meshing
     /// if it is longer]. --quality has as much, and all that it needs unless this is stated

@@ -1,5 +1,6 @@
 //! What a grid of cells cannot show, in words, and whether it can be looked for.
 
+use super::output::counted;
 use rfm::Solid;
 use rfm::geom::{Aabb, to_thousandths};
 use rfm::glam::DVec3;
@@ -43,8 +44,8 @@ pub(super) fn hidden(thin: &ThinCells, grid: &Grid) -> String {
         None => format!("{what} of unknown thickness"),
     };
     format!(
-        "in {} cells between {:.3} and {:.3}, the thinnest at {:.3}, {how}",
-        thin.count,
+        "in {} between {:.3} and {:.3}, the thinnest at {:.3}, {how}",
+        counted(thin.count, "cell"),
         to_thousandths(thin.bounds.min),
         to_thousandths(thin.bounds.max),
         to_thousandths(thin.at)

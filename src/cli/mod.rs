@@ -110,6 +110,18 @@ fn with_known_words(mut error: clap::Error) -> clap::Error {
         // it shows the flag that merely looks alike
         error.remove(ContextKind::Usage);
     }
+    let runs = error.get(ContextKind::Usage).is_some_and(|usage| usage.to_string().contains("rfm run "));
+    if runs && flag.as_deref() == Some("-s") {
+        error.insert(ContextKind::SuggestedArg, ContextValue::String("--scene".into()));
+    }
+    // of what stands behind `--` no command makes a flag's value
+    if let Some(ContextValue::StyledStrs(tips)) = error.remove(ContextKind::Suggested) {
+        let others: Vec<_> =
+            tips.into_iter().filter(|tip| !tip.to_string().contains("as a value, use '")).collect();
+        if !others.is_empty() {
+            error.insert(ContextKind::Suggested, ContextValue::StyledStrs(others));
+        }
+    }
     error
 }
 

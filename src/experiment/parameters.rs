@@ -233,7 +233,9 @@ pub(super) fn many_steps(scene: &Scene, parameters: &Parameters) -> Option<Diagn
     (steps >= MANY_STEPS).then(|| {
         let of = match cause == VISCOSITY {
             true => {
-                format!(" of {} Pa·s at a density of {} kg/m³", scene.fluid.viscosity, scene.fluid.density)
+                let viscosity = scene.fluid.viscosity;
+                let shown = if viscosity < 1e6 { viscosity.to_string() } else { format!("{viscosity:e}") };
+                format!(" of {shown} Pa·s at a density of {} kg/m³", scene.fluid.density)
             }
             false => String::new(),
         };

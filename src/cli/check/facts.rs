@@ -4,7 +4,7 @@ use std::path::Path;
 
 use serde::Serialize;
 
-use crate::cli::output::{Shown, significant};
+use crate::cli::output::{Shown, counted, significant};
 use rfm::geom::Aabb;
 use rfm::mesh::Resolution;
 use rfm::{Program, Solid};
@@ -142,7 +142,7 @@ pub(super) fn print(file: &str, program: &Program, facts: &[Facts]) {
     for scene in &module.scenes {
         let obstacles: Vec<&str> = scene.obstacles.iter().map(|o| o.name.as_str()).collect();
         let particles =
-            scene.fluid.particles.map_or("as many particles as fit".into(), |n| format!("{n} particles"));
+            scene.fluid.particles.map_or("as many particles as fit".into(), |n| counted(n, "particle"));
         let around =
             if obstacles.is_empty() { String::new() } else { format!(" around {}", obstacles.join(", ")) };
         say!("  scene {}: {particles} of {}{around}, {} s", scene.name, scene.fluid.name, scene.run.until);
@@ -189,7 +189,7 @@ fn print_solid(solid: &Facts) {
             }
             true => say!("    components  {components} of the solid"),
             false => say!(
-                "    components  {components} of the solid, but {coarser} with {half} cells instead of {cells}; \
+                "    components  {components} of what {cells} cells show, and {coarser} of what {half} show; \
                  `rfm mesh --cells {}` counts those of the surface on finer ones",
                 2 * cells
             ),

@@ -283,7 +283,10 @@ fn print(forecast: &Forecast, parameters: &Parameters) {
     if forecast.sound_speed.is_some() {
         say!("sound speed   {}", sound_speed(parameters));
     }
-    say!("steps         {}", forecast.steps);
+    match forecast.steps {
+        u64::MAX => say!("steps         more than {:.1e}", u64::MAX as f64),
+        steps => say!("steps         {steps}"),
+    }
     say!("passes        {}", forecast.passes.join(", "));
     say!("memory        about {}{}", size(forecast.bytes), free(forecast.bytes_free));
     say!(

@@ -29,7 +29,7 @@ impl Goal {
         match (options.steps, options.until) {
             (Some(steps), _) => Ok(Self::Steps(steps)),
             (None, Some(until)) if !(until.is_finite() && until >= 0.0) => {
-                Err(Failure::usage(format!("--until {until}: expected a time in seconds")))
+                Err(Failure::usage(format!("--until {until}: a run goes on until a time from 0 s on")))
             }
             (None, until) => {
                 let run = &experiment.scene().run;

@@ -11,7 +11,7 @@ use glam::DVec3;
 use rayon::prelude::*;
 
 use super::super::args::{CutFlag, Run};
-use super::super::{Failure, output};
+use super::super::{Failure, note, output};
 use crate::cli::output::Shown;
 use crate::cli::render::Surface;
 use crate::cli::scenery::{self, Drawn, Viewpoint, half, out_of_the_way, projection};
@@ -297,7 +297,12 @@ fn opened(look: Look<'_>, experiment: &Experiment, meshes: &[Mesh]) -> Result<Ve
         Some(Some(cut)) => by_plane(cut, body, mesh),
         None => out_of_the_way(&small, name, mesh, &samples),
     };
-    Ok(names.iter().zip(experiment.bodies()).zip(meshes).map(drawn).collect())
+    let all: Vec<Drawn> = names.iter().zip(experiment.bodies()).zip(meshes).map(drawn).collect();
+    let is_cut = |drawn: &Drawn| matches!(drawn, Drawn::Hidden | Drawn::Open(_) | Drawn::Glass(Some(_)));
+    if matches!(look.cut, Some(CutFlag::Plane(_))) && !all.is_empty() && !all.iter().any(is_cut) {
+        note("--cut: the plane meets no obstacle, so all of them are drawn whole");
+    }
+    Ok(all)
 }
 
 /// Points of the fluid as it is at the start.

@@ -8,7 +8,7 @@ use super::means::Means;
 use super::pictures;
 use super::probes::Probes;
 use super::watch::Watch;
-use crate::cli::output::{Shown, significant};
+use crate::cli::output::{Shown, counted, significant};
 use crate::cli::stated::Stated;
 use rfm::Experiment;
 use rfm::experiment::Deviation;
@@ -170,10 +170,10 @@ impl Summary {
 /// Prints the summary as text. The colours of pictures may have been `fitted` to end at a speed, m/s.
 pub(super) fn print(summary: &Summary, (frames, fitted): (&Frames, Option<f64>), probes: &Probes) {
     say!(
-        "{} particles {:.3e} m apart, {} steps of {:.3e} s = {} s simulated",
-        summary.particles,
+        "{} {:.3e} m apart, {} of {:.3e} s = {} s simulated",
+        counted(summary.particles, "particle"),
         summary.spacing,
-        summary.steps,
+        counted(summary.steps as usize, "step"),
         summary.time_step,
         significant(summary.simulated_seconds, 3)
     );

@@ -74,6 +74,15 @@ const COMMANDS: &[(&[&str], i32)] = &[
     (&["run", "post.rfm", "--until", "1", "s"], 2),
     (&["run", "post.rfm", "--rate", "20rpm"], 2),
     (&["render", "post.out", "--time", "0.5"], 2),
+    (&["mesh", "post.rfm", "-s", "post", "--simplify", "-1mm", "-o", "p.stl"], 2),
+    (&["run", "post.rfm", "-s", "drop"], 2),
+    (&["run", "post.rfm", "--until", "-1", "-o", "fresh"], 2),
+    (&["eval", "post.rfm", "--sweep", "d=1mm..2mm:2"], 2),
+    (&["check", "post"], 2),
+    (&["run", "empty.rfm", "--json"], 1),
+    (&["run", "post.rfm", "--json", "-D", "d=80 mm"], 2),
+    (&["mesh", "nofile.rfm", "--json"], 2),
+    (&["run", "post.rfm", "--steps", "1", "--cut", "x=9", "-o", "uncut"], 0),
 ];
 
 #[test]
