@@ -283,7 +283,13 @@ impl Lowering<'_> {
             other => {
                 let span = self.user_span(span);
                 let message = format!("expected a number or a field, found {}", other.describe());
-                self.report(Diagnostic::error(Code::WRONG_TYPE, span, message));
+                let diagnostic = Diagnostic::error(Code::WRONG_TYPE, span, message);
+                let is_shape =
+                    |part: &Value| matches!(part, Value::Number(node) if self.depends_on_place(*node));
+                let holds_shapes =
+                    matches!(other, Value::List(parts) if !parts.is_empty() && parts.iter().all(is_shape));
+                let help = "`any part in parts: part` joins the shapes of a list `parts`";
+                self.report(if holds_shapes { diagnostic.help(help) } else { diagnostic });
                 None
             }
         }

@@ -204,6 +204,11 @@ fn a_sweep_is_continued_replaced_or_left_alone() {
         "{}",
         refused.stderr
     );
+    assert!(refused.stderr.contains("write elsewhere with --into DIR"), "{}", refused.stderr);
+    // the folder is named by the flag with which it was given
+    let run = ["run", "a.rfm", "--sweep", "r=1..2:2", "-o", "a.sweep"];
+    let refused = rfm(folder.path(), &run).expect(2);
+    assert!(refused.stderr.contains("write elsewhere with -o DIR"), "{}", refused.stderr);
     // more values: those that are known are not computed again
     let first = folder.path().join("a.sweep/r=1/b.ply");
     std::fs::remove_file(&first).unwrap();

@@ -222,7 +222,7 @@ fn solids(
     let measured = tried.len();
     for (number, tried) in tried.into_iter().enumerate() {
         forwards.progress(MEASURED + (1.0 - MEASURED) * number as f64 / measured as f64);
-        bar.suspend(|| tried.notes.iter().for_each(|text| note(text)));
+        bar.suspend(|| tried.notes.iter().for_each(note));
         facts.push(conclude(program, tried, &mut searches, diagnostics));
     }
     bar.finish_and_clear();

@@ -22,7 +22,8 @@ fn task<'a>(
     options: String,
 ) -> Task<'a> {
     let folder = sweep.into.clone().unwrap_or_else(|| file.with_extension("sweep"));
-    Task { shared, command, file, sweeps: &sweep.sweep, folder, options, resume, force }
+    let folder_flag = "--into DIR";
+    Task { shared, command, file, sweeps: &sweep.sweep, folder, folder_flag, options, resume, force }
 }
 
 /// Refuses a path with a folder where a sweep takes the name of a file, which it writes in each of its folders. Only
@@ -127,7 +128,9 @@ pub(in crate::cli) fn run(shared: &Shared, options: &Run) -> Result<(), Failure>
         ..options.sweep.clone()
     };
     let again = [options.resume, options.force];
-    task(shared, Command::Run, &options.file, &sweep, again, format!("{single:?}")).go(|shared, folder| {
+    let task = task(shared, Command::Run, &options.file, &sweep, again, format!("{single:?}"));
+    let folder_flag = if options.output.is_some() { "-o DIR" } else { task.folder_flag };
+    Task { folder_flag, ..task }.go(|shared, folder| {
         // an interrupted run of the sweep is continued; everything else in its folder belongs to the sweep
         let resume = options.resume && runs::has_checkpoint(folder);
         let force = !resume && (options.resume || options.force);

@@ -34,6 +34,8 @@ pub(super) struct Task<'a> {
     pub file: &'a Path,
     pub sweeps: &'a [Sweep],
     pub folder: PathBuf,
+    /// How the folder is given.
+    pub folder_flag: &'static str,
     /// All other options, as a text that differs if they do.
     pub options: String,
     pub resume: bool,
@@ -233,6 +235,7 @@ impl Task<'_> {
             return Ok(new);
         };
         let known = known?;
+        let flag = self.folder_flag;
         if self.force {
             // if this is cut short, the index still names all folders, and none of them as whole
             let undone = known.rows.iter().map(|row| Row { exit: 130, ..row.clone() }).collect();
@@ -245,7 +248,7 @@ impl Task<'_> {
         if !self.resume {
             return Err(Failure::usage(format!(
                 "`{shown}` holds a sweep already ({} of `{}`, {} combinations): go on with it by --resume, replace it with \
-                 --force, or write elsewhere with --into DIR",
+                 --force, or write elsewhere with {flag}",
                 known.command,
                 known.file,
                 known.rows.len()
@@ -254,14 +257,14 @@ impl Task<'_> {
         if known.command != new.command || known.fingerprint != new.fingerprint {
             return Err(Failure::usage(format!(
                 "`{shown}` holds a sweep of another file, of an older state of it, or with other options: replace it with \
-                 --force, or write elsewhere with --into DIR"
+                 --force, or write elsewhere with {flag}"
             )));
         }
         let params = |index: &Index| -> Vec<String> { index.sweeps.iter().map(Axis::column).collect() };
         if params(&known) != params(&new) {
             return Err(Failure::usage(format!(
                 "`{shown}` holds a sweep of {}: sweep the same params with the same units, replace it with --force, or write \
-                 elsewhere with --into DIR",
+                 elsewhere with {flag}",
                 params(&known).join(", ")
             )));
         }
@@ -286,15 +289,15 @@ impl Task<'_> {
 
     /// Refuses a folder without the index of a sweep that holds a run, or a file with a name that a sweep writes.
     fn refuse_files_of_others(&self) -> Result<(), Failure> {
-        let shown = self.folder.shown();
+        let (shown, flag) = (self.folder.shown(), self.folder_flag);
         if let Some(content) = runs::run_in(&self.folder) {
             return Err(Failure::usage(format!(
-                "`{shown}` holds a run ({content}): write the sweep elsewhere with --into DIR"
+                "`{shown}` holds a run ({content}): write the sweep elsewhere with {flag}"
             )));
         }
         match FILES.into_iter().find(|name| self.folder.join(name).exists()) {
             Some(name) => Err(Failure::usage(format!(
-                "`{shown}` holds a file `{name}` that is not of a sweep: write elsewhere with --into DIR"
+                "`{shown}` holds a file `{name}` that is not of a sweep: write elsewhere with {flag}"
             ))),
             None => Ok(()),
         }
