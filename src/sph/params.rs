@@ -181,6 +181,11 @@ impl Parameters {
         self.mass_in_sums() / self.rest_density
     }
 
+    /// The volume, m³, that a particle at rest fills.
+    pub(crate) fn volume(&self) -> f64 {
+        self.particle_mass / self.rest_density
+    }
+
     /// What the method derives numbers from.
     pub(crate) fn scales(&self) -> Scales {
         Scales {

@@ -79,7 +79,8 @@ impl SpinViscosity {
         }
         let parameters = &core.parameters;
         let kernel = Wendland::new(parameters.support_radius);
-        let steepness = parameters.volume_in_sums() * kernel.steepness;
+        // of packed particles Σ V F·r⊗r is 1 with the volumes that they fill, not with those by which densities are found
+        let steepness = parameters.volume() * kernel.steepness;
         let n = core.particles.len();
         self.spin.resize(n);
         self.rubbing.resize(n);

@@ -78,7 +78,7 @@ impl Ahead {
     }
 
     /// Gives the fluid the pressures `s`, and the gravity and the tension of half of a step of the length `dt`, s.
-    pub fn give(&mut self, core: &mut Core, (forces, walls): (&Solver, &Walls), dt: f64) {
+    pub fn give(&mut self, core: &mut Core, (forces, walls): (&mut Solver, &Walls), dt: f64) {
         forces.find_push_of(core, walls, &self.s, &mut self.push);
         if let Some(reaction) = Reaction::of(core, 0.5 * dt) {
             forces.note_walls(reaction, walls, core.parameters.rest_density, (&self.push, &self.s));

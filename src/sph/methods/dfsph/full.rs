@@ -6,25 +6,6 @@
 //! densities, and of all rates only their differences from the mean count: a mean is an error of the sums, which no
 //! pressure can take away, and a uniform one would grow without end. (If nothing is compressed at all, without that,
 //! a flow between two cylinders bursts. If gaps up to a quantile of the densities are left, it is rougher by a sixth.)
-//!
-//! Densities say little about the motion of single particles. In a shear they pass each other, and each that comes near
-//! a particle makes it denser for a while. If pressure takes that away, particles swerve, and viscosity has more to
-//! do: in the middle of a channel seven spacings wide the fluid resisted as if it were a third more viscous, at any
-//! Reynolds number. So away from walls what pressure has to take away is smoothed over neighbours, and what one
-//! particle has more than its neighbours is left to the displacements, which are no velocity. (If it is smoothed
-//! beside walls, too, the flow in that channel is right, but a rod that shakes carries half of its water.)
-
-use fearless_simd::{Simd, SimdFloat};
-
-use super::walls::Walls;
-use crate::sph::{
-    core::Core,
-    kernel::Wendland,
-    pairs::{PairPass, Real},
-};
-
-/// How often rates are smoothed. Four times change no more than twice.
-const SMOOTHINGS: usize = 2;
 
 /// Part of a deviation from the mean density that is taken back within the relaxation time. Without it a rod that
 /// shakes makes half as much noise again; with all of it a vessel of turning water is off by a fifth more.
@@ -49,56 +30,9 @@ pub(super) fn find_unwanted(
 }
 
 /// Takes from the numbers of each body their mean.
-pub(super) fn remove_means(numbers: &mut [f64], of: &[usize], count: usize) {
+fn remove_means(numbers: &mut [f64], of: &[usize], count: usize) {
     let mean = means(numbers, of, count);
     numbers.iter_mut().zip(of).for_each(|(number, body)| *number -= mean[*body]);
-}
-
-/// Replaces the numbers of the particles that have no wall near them by means over those of their neighbours that have
-/// none either. Beside walls each number counts as it is: there the fluid has to give way to them.
-pub(super) fn smooth(core: &Core, walls: &Walls, numbers: &mut Vec<f64>, spare: &mut Vec<f64>) {
-    let kernel = Wendland::new(core.parameters.support_radius);
-    let mut is_free = vec![1.0; numbers.len()];
-    walls.found().iter().for_each(|(i, _)| is_free[*i as usize] = 0.0);
-    for _ in 0..SMOOTHINGS {
-        spare.resize(numbers.len(), 0.0);
-        let (from, is_free) = (&numbers[..], &is_free[..]);
-        core.sum(&Smooth { kernel, numbers: from, is_free }, [from, is_free], [&mut spare[..]]);
-        std::mem::swap(numbers, spare);
-    }
-}
-
-/// The pass that finds means over neighbours, Σ W·b / Σ W.
-#[derive(Clone, Copy)]
-struct Smooth<'a> {
-    kernel: Wendland,
-    numbers: &'a [f64],
-    is_free: &'a [f64],
-}
-
-impl PairPass<2, 2, 1> for Smooth<'_> {
-    #[inline(always)]
-    fn add<S: Simd, V: SimdFloat<S, Element: Real>>(
-        &self,
-        _: [V; 3],
-        r2: V,
-        _: &[V; 2],
-        [number, is_free]: [V; 2],
-        [sum, weights]: &mut [V; 2],
-    ) {
-        let of = V::Element::of;
-        let s = self.kernel.nearness(r2);
-        let f = s * s;
-        // 1 + 4q = 5 − 4s
-        let weight = f * f * s.mul_add(of(-4.0), of(5.0)) * is_free;
-        *sum = weight.mul_add(number, *sum);
-        *weights += weight;
-    }
-
-    fn finish(&self, i: usize, [sum, weights]: [f64; 2]) -> [f64; 1] {
-        // a free particle is its own neighbour
-        [if self.is_free[i] > 0.0 { sum / weights } else { self.numbers[i] }]
-    }
 }
 
 /// The mean of the numbers of each body.

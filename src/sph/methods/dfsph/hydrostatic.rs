@@ -96,7 +96,7 @@ impl Hydrostatic {
     }
 
     /// Notes what walls bear of the fluid's weight.
-    pub fn note_walls(&self, core: &Core, (forces, walls): (&Solver, &Walls), reaction: Reaction<'_>) {
+    pub fn note_walls(&self, core: &Core, (forces, walls): (&mut Solver, &Walls), reaction: Reaction<'_>) {
         let rest = core.parameters.rest_density;
         let against = -core.parameters.gravity;
         let s: Vec<f64> = self.pressure.iter().map(|p| p / (rest * rest)).collect();

@@ -2,6 +2,7 @@
 
 mod ahead;
 mod arrest;
+mod corrected;
 mod full;
 mod hydrostatic;
 mod mirrored;

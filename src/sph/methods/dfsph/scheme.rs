@@ -22,7 +22,8 @@
 //! gained 8 % of its energy in this way). So each particle remembers the error as a debt D of density, and
 //! the pressure pays it back within τ (Baumgarte 1972). The tolerance of this solve is that of the density
 //! over τ. A part of the density that displacements take away is added to the debt, see [`OWED`]. Velocities that
-//! displacements undo are taken away, see [`Arrest`].
+//! displacements undo are taken away, see [`Arrest`]. Where the fluid fills its vessel, the sums of forces are exact for
+//! flows that are linear in space, see [`corrected`](super::corrected).
 //!
 //! Both systems count the part of the kernel that is missing before a free surface as fluid
 //! ([`free_surface`](super::super::free_surface)), so that the outermost particles keep the same distance as
@@ -66,9 +67,9 @@
 //!
 //! Invariant: the densities are those of the present positions.
 
-#[cfg(test)]
-mod mirrored_tests;
 mod pressure;
+#[cfg(test)]
+mod symmetry_tests;
 
 use glam::DMat3;
 use smallvec::{SmallVec, smallvec};
@@ -201,8 +202,11 @@ impl Scheme for DivergenceFree {
             self.ahead.hold_back(core, dt);
         }
         self.keep_density(core, dt);
-        if self.find_displacements(core, dt, OWED) {
-            self.arrest.find(core, (&self.places, &self.walls), &self.free, &self.loaded);
+        // in a full vessel displacements undo above all that single particles pass each other, which nothing owes
+        let is_full = core.parameters.fills_vessel;
+        let owed = if is_full { 0.0 } else { OWED };
+        if self.find_displacements(core, dt, owed) && !is_full {
+            self.arrest.find(core, (&mut self.places, &self.walls), &self.free, &self.loaded);
             self.arrest.take(core, &self.walls, dt, &mut self.displacement);
         }
         core.move_obstacles(dt);
@@ -424,6 +428,8 @@ impl DivergenceFree {
     fn keep_density(&mut self, core: &mut Core, dt: f64) {
         let rest = core.parameters.rest_density;
         let relaxation = relaxation_time(&core.parameters, core.speed, dt);
+        let is_corrected = core.parameters.fills_vessel && self.walls.mirrors().is_none();
+        self.forces.correct(core, &self.walls, is_corrected);
         // the compression without pressure; each iteration finds how much of it s takes away
         self.forces.find_rate_of(core, &self.walls, &core.particles.velocity, RateOf::Velocity(&self.whole));
         let found = (&self.forces.rate[..], &self.loaded[..], &self.debt[..]);
@@ -434,9 +440,6 @@ impl DivergenceFree {
             let is_sealed = core.parameters.is_sealed;
             carried = is_sealed.then(|| Hydrostatic::of(core, bodies.clone(), core.parameters.gravity));
             full::find_unwanted(&mut self.free, &bodies, found, relaxation);
-            // a mean over neighbours changes those of the bodies
-            full::smooth(core, &self.walls, &mut self.free, &mut self.field);
-            full::remove_means(&mut self.free, &bodies.0, bodies.1);
         } else {
             let (rates, densities, debts) = found;
             let unwanted = |((rate, rho), debt): ((&f64, &f64), &f64)| {
@@ -459,7 +462,7 @@ impl DivergenceFree {
         if let Some(reaction) = Reaction::of(core, dt) {
             self.forces.note_walls(reaction, &self.walls, rest, (&self.forces.push, &self.forces.s));
             if let Some(hydrostatic) = &carried {
-                hydrostatic.note_walls(core, (&self.forces, &self.walls), reaction);
+                hydrostatic.note_walls(core, (&mut self.forces, &self.walls), reaction);
             }
         }
         for ((free, rate), debt) in self.free.iter().zip(&self.forces.rate).zip(&mut self.debt) {
@@ -472,7 +475,7 @@ impl DivergenceFree {
         // what is given in advance keeps densities to second order, of which a rate of density knows nothing
         self.drift.clone_from(&core.particles.velocity);
         if self.last_dt > 0.0 {
-            self.ahead.give(core, (&self.forces, &self.walls), dt);
+            self.ahead.give(core, (&mut self.forces, &self.walls), dt);
         }
         add_scaled(&mut core.acceleration, &self.ahead.push, 0.5);
         self.report_pressure(core, dt, relaxation, carried.as_ref());

@@ -3,6 +3,7 @@
 use rayon::prelude::*;
 
 use super::super::images::WithImages;
+use super::corrected::Correction;
 use super::passes::{Constants, Continuation, Push, Squeeze};
 use super::rigid::Rigid;
 use super::walls::Walls;
@@ -29,6 +30,8 @@ const LONELY: f64 = 1e-3;
 /// One system, its last answer, and working memory.
 pub(super) struct Solver {
     continuation: Continuation,
+    /// Corrections of the sums, if the fluid fills its vessel.
+    correction: Option<Correction>,
     /// The answer s: p/ρ² where it changes velocities.
     pub s: Vec<f64>,
     /// The diagonal of the system: the decrease of the particle's own dρ/dt in a second by a unit of s.
@@ -106,6 +109,7 @@ impl Solver {
     pub fn new(continuation: Continuation, parameters: &Parameters, n: usize) -> Self {
         let mut solver = Self {
             continuation,
+            correction: None,
             s: vec![0.0; n],
             factor: vec![0.0; n],
             push: Vectors::default(),
@@ -117,6 +121,15 @@ impl Solver {
         };
         solver.push.resize(n);
         solver
+    }
+
+    /// Corrects the sums of this system from now on, or no more. To be called whenever particles have moved.
+    pub fn correct(&mut self, core: &Core, walls: &Walls, is_corrected: bool) {
+        if is_corrected {
+            self.correction.get_or_insert_default().find(core, walls);
+        } else {
+            self.correction = None;
+        }
     }
 
     /// Finds s ≥ 0 such that the rate of density `free` + dt·(rate of a(s)) vanishes where s > 0 and is not
@@ -228,15 +241,19 @@ impl Solver {
 
     /// Finds a(s).
     fn find_push(&mut self, core: &Core, walls: &Walls) {
-        let mut push = std::mem::take(&mut self.push);
-        self.find_push_of(core, walls, &self.s, &mut push);
-        self.push = push;
+        let (mut push, s) = (std::mem::take(&mut self.push), std::mem::take(&mut self.s));
+        self.find_push_of(core, walls, &s, &mut push);
+        (self.push, self.s) = (push, s);
     }
 
     /// Finds the a(s) of other pressures than the answer.
-    pub fn find_push_of(&self, core: &Core, walls: &Walls, s: &[f64], push: &mut Vectors) {
+    pub fn find_push_of(&mut self, core: &Core, walls: &Walls, s: &[f64], push: &mut Vectors) {
         let (constants, continuation) = (Constants::of(&core.parameters), self.continuation);
         let pass = Push { constants, walls, pressure: s, continuation };
+        if let Some(correction) = &mut self.correction {
+            correction.push(core, pass, s, push);
+            return;
+        }
         let Vectors { x, y, z } = push;
         match walls.mirrors() {
             Some(mirrors) => {
@@ -268,6 +285,10 @@ impl Solver {
             continuation: self.continuation,
             with_walls: matches!(of, RateOf::Velocity(_)),
         };
+        if let Some(correction) = &self.correction {
+            correction.rate(core, pass, &mut self.rate);
+            return;
+        }
         let Vectors { x, y, z } = velocity;
         match walls.mirrors() {
             Some(mirrors) => {
@@ -303,6 +324,7 @@ impl Solver {
         columns.map(|column| 8 * column.capacity()).iter().sum::<usize>()
             + self.push.bytes()
             + self.completed.bytes()
+            + self.correction.as_ref().map_or(0, Correction::bytes)
     }
 }
 
