@@ -45,11 +45,12 @@ pub(crate) use bounds::range::{
     Affine, Limits, RangeRule, Region, SQUARES_OVERFLOW, SQUARES_UNDERFLOW, WEIGHT_ROUNDING,
 };
 pub(crate) use contraction::{
-    Contracted, Contractor, LinearForm, SURFACE_ROUNDING, Wanted, contract_linear, contract_linear_around,
+    Contracted, Contractor, Far, LinearForm, SURFACE_ROUNDING, Scales, Wanted, contract_linear, contract_linear_around,
     is_nowhere_positive, reach,
 };
 pub(crate) use derived::contact::{contact, wall_velocity};
 pub(crate) use derived::forward::forward_gradient;
+pub(crate) use derived::framed::{Framed, framed};
 pub use derived::gradient::gradient;
 pub use derived::gradient::gradient_and_rate;
 pub(crate) use derived::hoisted::{Hoisted, Outside, Uniforms, hoisted};

@@ -13,6 +13,7 @@ use crate::geom::Aabb;
 use crate::interval::Interval;
 use crate::ir::bounds::choice::Choice;
 use crate::ir::bounds::range::{Affine, Region, is_zero};
+use crate::ir::function::BinaryFunction;
 use crate::ir::graph::{Axis, Expr, Graph, Node};
 use crate::ir::lookup::Tables;
 use crate::ir::op::Binary;
@@ -24,8 +25,8 @@ pub struct Contractor {
     pub(super) degrees: Vec<Degree>,
     root: Node,
     /// Whether the root is a number only if the node is.
-    needed: Vec<bool>,
-    operands: Vec<SmallVec<[Operand; 3]>>,
+    pub(super) needed: Vec<bool>,
+    pub(super) operands: Vec<SmallVec<[Operand; 3]>>,
     /// In the order of the nodes.
     choices: Vec<Choice>,
     /// Linear forms that are operands of something else, or the root.
@@ -34,14 +35,24 @@ pub struct Contractor {
     /// Whether the root is a form of second degree.
     pub(super) is_quadric: bool,
     pub(super) tables: Tables,
+    /// The angles that the root needs.
+    pub(super) angles: Vec<Angle>,
+}
+
+/// An angle atan2(a, b), which jumps where a = 0 and b < 0.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Angle {
+    pub node: Node,
+    pub a: Node,
+    pub b: Node,
 }
 
 /// An operand of a node.
 #[derive(Debug, Clone, Copy)]
-struct Operand {
-    node: Node,
+pub(super) struct Operand {
+    pub node: Node,
     /// Whether the node that reads it is a number only if this one is.
-    needed: bool,
+    pub needed: bool,
 }
 
 /// The question about a formula.
@@ -104,6 +115,20 @@ impl Contractor {
         let forms = graph.nodes().filter(is_form).map(|(node, _)| node).collect();
         let coordinates = Axis::SPACE.map(|axis| graph.find(Expr::Coordinate(axis)));
         let tables = graph.tables().clone();
+        let angle = |(node, expr): (Node, Expr)| match expr {
+            Expr::Binary(Binary::Call(BinaryFunction::Atan2), a, b) => Some(Angle { node, a, b }),
+            Expr::Unary(..)
+            | Expr::Binary(..)
+            | Expr::Constant(_)
+            | Expr::Coordinate(_)
+            | Expr::Parameter(_)
+            | Expr::Uniform(_)
+            | Expr::Lookup(..) => None,
+        };
+        // where one of these is no number, the root is none
+        let is_needed = |angle: &Angle| needed[angle.node.index()] && needed[angle.a.index()];
+        let angles =
+            graph.nodes().take(rules.len()).filter_map(angle).filter(is_needed).collect();
         Self {
             is_quadric: is_quadric(&rules, root),
             rules,
@@ -115,6 +140,7 @@ impl Contractor {
             forms,
             coordinates,
             tables,
+            angles,
         }
     }
 

@@ -74,7 +74,7 @@ fn coordinate(axis: Axis, region: &Region<'_>) -> Interval {
     }
 }
 
-fn unary(op: Unary, a: Interval) -> Numbers {
+pub fn unary(op: Unary, a: Interval) -> Numbers {
     match op {
         Unary::Neg | Unary::Abs | Unary::Sign | Unary::Floor | Unary::Round => range::unary(op, a).into(),
         Unary::Sqrt => partial(a, POSITIVE, Interval::sqrt),
@@ -99,7 +99,7 @@ fn unary(op: Unary, a: Interval) -> Numbers {
     }
 }
 
-fn binary(op: Binary, a: Interval, b: Interval) -> Numbers {
+pub fn binary(op: Binary, a: Interval, b: Interval) -> Numbers {
     match op {
         Binary::Add => sum(a, b).into(),
         Binary::Sub => sum(a, -b).into(),

@@ -1,12 +1,19 @@
 //! A box made smaller by values: hull consistency.
 
-use super::contractor::{Contractor, SCRATCH, Wanted};
+use smallvec::SmallVec;
+
+use super::contractor::{Contractor, SCRATCH, Scratch, Wanted};
 use super::forms;
 use super::linear::LinearForm;
 use super::quadric::ellipsoid;
 use super::sets::Contracted;
 use crate::geom::Aabb;
+use crate::interval::Interval;
 use crate::ir::bounds::range::Region;
+use crate::ir::graph::Node;
+
+/// Cuts of which both sides are looked at.
+const MOST_CUTS: usize = 2;
 
 impl Contractor {
     /// Cuts off parts of a box where the formula is not positive. With `found` it also returns the values
@@ -17,7 +24,64 @@ impl Contractor {
         space: &mut Aabb,
         found: Option<&mut Vec<LinearForm>>,
     ) -> Contracted {
+        if found.is_none() && !self.angles.is_empty() {
+            return self.contract_beside_cuts(wanted, space);
+        }
         self.contract_given(&[], wanted, space, found)
+    }
+
+    /// Cuts off parts of a box in which angles may jump: what is left on either side of each cut is found alone.
+    fn contract_beside_cuts(&self, wanted: &Wanted<'_>, space: &mut Aabb) -> Contracted {
+        SCRATCH.with_borrow_mut(|scratch| {
+            let before = *space;
+            let region = Region { space: &before, ..wanted.region };
+            scratch.known.clear();
+            if self.forward(&region, scratch).is_none() {
+                return Contracted::Nowhere;
+            }
+            let cuts = self.cuts(scratch);
+            let (mut hull, mut filled) = (Aabb::EMPTY, 0);
+            let sides = 1_u32 << cuts.len();
+            for side in 0..sides {
+                scratch.known.clear();
+                for (k, cut) in cuts.iter().enumerate() {
+                    let half = if side >> k & 1 == 0 { Interval { lo: 0.0, ..Interval::ALL } } else { Interval { hi: 0.0, ..Interval::ALL } };
+                    let nodes = self.angles.iter().filter(|angle| angle.a == *cut).map(|angle| angle.node);
+                    scratch.known.extend(nodes.chain([*cut]).map(|node| (node, half)));
+                }
+                scratch.known.sort_by_key(|(node, _)| node.index());
+                let mut own = before;
+                match self.pass(&region, wanted.negated, scratch) {
+                    None => {}
+                    Some(true) => {
+                        filled += 1;
+                        hull = hull.union(&own);
+                    }
+                    Some(false) => {
+                        if self.read_box(&scratch.values, &mut own).is_some() {
+                            hull = hull.union(&own);
+                        }
+                    }
+                }
+            }
+            if filled == sides {
+                return Contracted::Everywhere;
+            }
+            *space = hull;
+            if hull.is_empty() { Contracted::Nowhere } else { Contracted::Somewhere }
+        })
+    }
+
+    /// The numbers at whose zeros angles jump in a box, a few of them.
+    fn cuts(&self, scratch: &Scratch) -> SmallVec<[Node; MOST_CUTS]> {
+        let mut cuts = SmallVec::new();
+        for angle in &self.angles {
+            let [a, b] = [angle.a, angle.b].map(|node| scratch.values[node.index()]);
+            if a.contains(0.0) && b.lo < 0.0 && !cuts.contains(&angle.a) && cuts.len() < MOST_CUTS {
+                cuts.push(angle.a);
+            }
+        }
+        cuts
     }
 
     /// Cuts off parts of a box in which linear forms of other formulas have known ranges, too.
@@ -65,7 +129,7 @@ impl Contractor {
 mod tests {
     use super::super::linear::{contract_linear, contract_linear_around};
     use super::*;
-    use crate::ir::graph::{Axis, Graph, Node};
+    use crate::ir::graph::{Axis, Graph};
     use crate::ir::{Binary, Interpreter, Unary, UnaryFunction};
     use glam::DVec3;
     use proptest::prelude::*;

@@ -8,6 +8,7 @@
 //! | `sets` | intervals as sets of numbers, and the possible results for a box |
 //! | `contractor` | both, over all nodes of a graph |
 //! | `forms` | the linear forms in a graph |
+//! | `growth`, `far` | formulas far from the origin, by the powers with which they grow |
 //! | `hull` | a box made smaller by values (hull consistency) |
 //! | `slopes` | a box made smaller by derivatives (the mean value form) |
 //! | `linear` | linear forms with known ranges, and the box around them (linear programming) |
@@ -23,8 +24,10 @@
 
 mod backward;
 mod contractor;
+mod far;
 mod forms;
 mod forward;
+mod growth;
 mod hull;
 mod linear;
 mod quadric;
@@ -34,6 +37,8 @@ mod sets;
 mod slopes;
 
 pub use contractor::{Contractor, Wanted};
+pub use far::Far;
+pub use growth::Scales;
 pub use linear::{LinearForm, contract_linear, contract_linear_around};
 pub use reach::{is_nowhere_positive, reach};
 pub use sets::Contracted;

@@ -66,6 +66,18 @@ impl Contractor {
     }
 }
 
+impl Contractor {
+    /// The values over a region. `None` if the formula may be undefined there.
+    pub fn values(&self, region: &Region<'_>) -> Option<Interval> {
+        SCRATCH.with_borrow_mut(|scratch| {
+            scratch.known.clear();
+            self.forward(region, scratch)?;
+            let root = self.root().index();
+            (!scratch.may_fail[root]).then(|| scratch.values[root])
+        })
+    }
+}
+
 /// Cuts off the parts that the derivatives exclude. `forms` receives the linear forms in p − `origin` that
 /// follow, so that several formulas can be solved together.
 fn contract(

@@ -2,6 +2,7 @@
 
 pub mod contact;
 pub mod forward;
+pub mod framed;
 pub mod gradient;
 pub mod hoisted;
 pub mod localised;

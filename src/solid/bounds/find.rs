@@ -3,8 +3,9 @@
 use super::contraction::Tree;
 use super::extent::Bounds;
 use super::found::FoundBounds;
-use super::search::{Found, Side, search};
+use super::search::{EVERYWHERE, Found, Side, search};
 use super::whole::WholeFormula;
+use crate::geom::Aabb;
 use crate::solid::construction::Solid;
 
 impl Solid {
@@ -27,20 +28,27 @@ impl Solid {
 
     fn found_bounds(&self) -> &FoundBounds {
         self.moment.bounds(|| {
-            let Some(Found { hull, is_tight }) = self.hull() else {
-                return FoundBounds { bounds: Bounds::Empty, open: Vec::new(), are_tight: true };
-            };
-            let open: Vec<Side> = Side::all().filter(|side| side.is_open(&hull)).collect();
-            let bounds = if open.is_empty() { Bounds::Within(hull) } else { Bounds::Unbounded };
-            FoundBounds { bounds, open, are_tight: is_tight }
+            let mut found = self.found_within(EVERYWHERE);
+            if found.bounds == Bounds::Unbounded
+                && let Some(around) = self.box_far_out().or_else(|| self.box_of_operands())
+            {
+                found = self.found_within(around);
+            }
+            found
         })
     }
 
-    /// A box around the solid, which may reach to the ends of the search region; `None` for an empty solid.
-    fn hull(&self) -> Option<Found> {
-        match self.parts_with_hulls() {
-            Some(parts) => search(&Tree { words: parts.words.clone(), parts }),
-            None => search(&WholeFormula::of(self, false)),
-        }
+    /// The bounds of the part of the solid in a box.
+    pub(super) fn found_within(&self, around: Aabb) -> FoundBounds {
+        let found = match self.parts_with_hulls() {
+            Some(parts) => search(&Tree { words: parts.words.clone(), parts }, around),
+            None => search(&WholeFormula::of(self, false), around),
+        };
+        let Some(Found { hull, is_tight }) = found else {
+            return FoundBounds { bounds: Bounds::Empty, open: Vec::new(), are_tight: true };
+        };
+        let open: Vec<Side> = Side::all().filter(|side| side.is_open(&hull)).collect();
+        let bounds = if open.is_empty() { Bounds::Within(hull) } else { Bounds::Unbounded };
+        FoundBounds { bounds, open, are_tight: is_tight }
     }
 }

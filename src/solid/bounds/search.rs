@@ -115,9 +115,11 @@ pub struct Found {
     pub is_tight: bool,
 }
 
-/// A box around a solid; `None` if it is proven to be empty.
-pub fn search<S: Shrink>(solid: &S) -> Option<Found> {
-    let mut hull = Aabb::new(DVec3::splat(-SEARCH_RADIUS), DVec3::splat(SEARCH_RADIUS));
+/// The box in which solids are looked for.
+pub const EVERYWHERE: Aabb = Aabb { min: DVec3::splat(-SEARCH_RADIUS), max: DVec3::splat(SEARCH_RADIUS) };
+
+/// A box around the part of a solid that is in `hull`; `None` if it is proven to be empty.
+pub fn search<S: Shrink>(solid: &S, mut hull: Aabb) -> Option<Found> {
     solid.shrink(&solid.everything(), &mut hull, Effort::Large)?;
     let mut cells = solid.parts(&hull);
     // a solid that does not end on one side need not be measured on the others

@@ -1,5 +1,7 @@
 //! Bounds of a solid that is too large to be taken apart: each junction is visited once, whatever uses it.
 
+use std::borrow::Cow;
+
 use crate::geom::Aabb;
 use crate::interval::Interval;
 use crate::ir::{
@@ -31,10 +33,9 @@ pub struct WholeFormula {
 
 impl WholeFormula {
     pub fn of(solid: &Solid, negated: bool) -> Self {
-        let (graph, root) = solid.formula();
         let time = solid.moment.interval();
-        let now = (solid.moves() && time.lo == time.hi).then(|| at_instant(graph, root, time.lo));
-        let (graph, root) = now.as_ref().map_or((graph, root), |(graph, root)| (graph, *root));
+        let now = at_its_time(solid);
+        let (graph, root) = (now.0.as_ref(), now.1);
         let hull = joined_boxes(graph, root, time, negated);
         Self { contractor: Contractor::new(graph, root), time, negated, hull }
     }
@@ -93,6 +94,18 @@ impl Shrink for WholeFormula {
 
     fn is_inside(known: &bool) -> bool {
         *known
+    }
+}
+
+/// The formula of a solid; at an instant without its time.
+pub fn at_its_time(solid: &Solid) -> (Cow<'_, Graph>, Node) {
+    let (graph, root) = solid.formula();
+    let time = solid.moment.interval();
+    if solid.moves() && time.lo == time.hi {
+        let (graph, root) = at_instant(graph, root, time.lo);
+        (Cow::Owned(graph), root)
+    } else {
+        (Cow::Borrowed(graph), root)
     }
 }
 

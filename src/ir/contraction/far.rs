@@ -1,0 +1,200 @@
+//! The sign of a formula far from the origin.
+
+use super::contractor::{Contractor, Operand, SCRATCH, Scratch, Wanted};
+use super::forward;
+use super::growth::{Growth, Scales};
+use super::rule::{Degree, Rule};
+use super::sets::Contracted;
+use crate::geom::Aabb;
+use crate::interval::Interval;
+use crate::ir::bounds::range::{Affine, Region};
+use crate::ir::function::BinaryFunction;
+use crate::ir::graph::{Axis, Expr, Node};
+use crate::ir::op::{Binary, Unary};
+
+/// Cuts of angles that are looked at from both sides, each apart from the others.
+const MOST_CUTS: u32 = 3;
+
+/// Points far from the origin: s·u for all scales s and all directions u.
+#[derive(Debug, Clone, Copy)]
+pub struct Far {
+    /// A box on a face of the cube with corners at ±1.
+    pub directions: Aabb,
+    /// The scales.
+    pub scales: Scales,
+}
+
+impl Far {
+    /// A box around the points.
+    pub fn around(&self) -> Aabb {
+        let [near, far] = [self.scales.from, self.scales.to].map(f64::exp2);
+        let (min, max) = (self.directions.min, self.directions.max);
+        Aabb::new((min * near).min(min * far), (max * near).max(max * far))
+    }
+}
+
+/// The angles around the z axis, or another one, that jump among the points.
+#[derive(Default)]
+struct Cuts {
+    /// A bit for each, in the order of the nodes: whether it is taken from the side where it is positive. `None` for
+    /// both.
+    sides: Option<u32>,
+    /// How many have a bit.
+    counted: u32,
+    met: u32,
+}
+
+impl Cuts {
+    /// The part of an angle that jumps at its cut.
+    fn part(&mut self, angle: Interval) -> Interval {
+        let number = self.met;
+        self.met += 1;
+        match self.sides {
+            Some(sides) if number < self.counted && sides >> number & 1 == 1 => {
+                Interval { lo: angle.lo.max(0.0), ..angle }
+            }
+            Some(_) if number < self.counted => Interval { hi: angle.hi.min(0.0), ..angle },
+            Some(_) | None => angle,
+        }
+    }
+}
+
+impl Contractor {
+    /// Where a formula is positive among far points, or negative, as is wanted.
+    pub fn far(&self, wanted: &Wanted<'_>, far: &Far) -> Contracted {
+        SCRATCH.with_borrow_mut(|scratch| {
+            scratch.known.clear();
+            let around = far.around();
+            if self.forward(&Region { space: &around, ..wanted.region }, scratch).is_none() {
+                return Contracted::Nowhere;
+            }
+            let mut cuts = Cuts::default();
+            let verdict = self.sign_far(wanted.negated, far, scratch, &mut cuts);
+            if verdict != Contracted::Somewhere || cuts.met == 0 {
+                return verdict;
+            }
+            // each angle is taken from one side of its cut, then from the other
+            let counted = cuts.met.min(MOST_CUTS);
+            let is_nowhere = |sides: u32| {
+                let mut cuts = Cuts { sides: Some(sides), counted, met: 0 };
+                self.sign_far(wanted.negated, far, scratch, &mut cuts) == Contracted::Nowhere
+            };
+            if (0..1 << counted).all(is_nowhere) { Contracted::Nowhere } else { Contracted::Somewhere }
+        })
+    }
+
+    fn sign_far(&self, negated: bool, far: &Far, scratch: &Scratch, cuts: &mut Cuts) -> Contracted {
+        let root = self.root().index();
+        let mut all: Vec<Growth> = Vec::with_capacity(root + 1);
+        for i in 0..=root {
+            let values = scratch.values[i];
+            let is_open = self.operands[i].iter().any(|&Operand { node, needed }| {
+                !needed && (scratch.may_fail[node.index()] || all[node.index()].may_fail(far.scales))
+            });
+            let growth = if is_open || self.degrees[i] == Degree::Number {
+                Growth::number(values)
+            } else {
+                match self.growth(i, far, &all, cuts) {
+                    Some(growth) => growth,
+                    // it is undefined
+                    None if self.needed[i] => return Contracted::Nowhere,
+                    None => Growth::UNKNOWN,
+                }
+            };
+            all.push(growth.within(values, far.scales));
+        }
+        let factor = if negated { -all[root].factor } else { all[root].factor };
+        if factor.hi < 0.0 {
+            Contracted::Nowhere
+        } else if factor.lo > 0.0 && !scratch.may_fail[root] && !all[root].may_fail(far.scales) {
+            Contracted::Everywhere
+        } else {
+            Contracted::Somewhere
+        }
+    }
+
+    /// How a node grows; `None` if it is undefined at all points.
+    fn growth(&self, i: usize, far: &Far, all: &[Growth], cuts: &mut Cuts) -> Option<Growth> {
+        let scales = far.scales;
+        let of = |node: Node| all[node.index()];
+        match self.rules[i] {
+            Rule::Power { of: base, exponent } => Some(of(base).to_the(exponent, scales)),
+            Rule::Slab { of: e, first, second } => {
+                let line = |Affine { slope, offset, minus }: Affine| {
+                    let line = if slope < 0.0 { of(e).negated() } else { of(e) };
+                    match offset.map(of) {
+                        None => line,
+                        Some(by) if minus => line.plus(by.negated(), scales),
+                        Some(by) => line.plus(by, scales),
+                    }
+                };
+                Some(line(first).times(line(second), scales))
+            }
+            Rule::Plain(Expr::Coordinate(axis)) => {
+                let Aabb { min, max } = far.directions;
+                let axis = match axis {
+                    Axis::X => 0,
+                    Axis::Y => 1,
+                    Axis::Z => 2,
+                    Axis::T => return Some(Growth::UNKNOWN),
+                };
+                Some(Growth::coordinate(Interval { lo: min[axis], hi: max[axis] }))
+            }
+            Rule::Plain(Expr::Unary(op, a)) => unary(op, of(a), scales),
+            Rule::Plain(Expr::Binary(op, a, b)) => binary(op, of(a), of(b), scales, cuts),
+            // what is known of them does not grow
+            Rule::Plain(Expr::Lookup(..) | Expr::Constant(_) | Expr::Parameter(_) | Expr::Uniform(_)) => {
+                Some(Growth::UNKNOWN)
+            }
+        }
+    }
+}
+
+fn unary(op: Unary, a: Growth, scales: Scales) -> Option<Growth> {
+    let between = |lo: f64, hi: f64| Growth::number(Interval { lo, hi });
+    match op {
+        Unary::Neg => Some(a.negated()),
+        Unary::Abs => Some(a.abs()),
+        Unary::Sqrt => a.real_power(0.5, scales),
+        Unary::Floor => Some(a.plus(between(-1.0, 0.0), scales)),
+        Unary::Round => Some(a.plus(between(-0.5, 0.5), scales)),
+        Unary::Sign if a.factor.lo > 0.0 => Some(between(1.0, 1.0)),
+        Unary::Sign if a.factor.hi < 0.0 => Some(between(-1.0, -1.0)),
+        Unary::Sign => Some(between(-1.0, 1.0)),
+        Unary::Call(_) => forward::unary(op, a.values(scales)).range.map(Growth::number),
+    }
+}
+
+fn binary(op: Binary, a: Growth, b: Growth, scales: Scales, cuts: &mut Cuts) -> Option<Growth> {
+    match op {
+        Binary::Add => Some(a.plus(b, scales)),
+        Binary::Sub => Some(a.plus(b.negated(), scales)),
+        Binary::Mul => Some(a.times(b, scales)),
+        Binary::MulOrZero if b.factor.contains(0.0) && a.may_fail(scales) => Some(Growth::UNKNOWN),
+        Binary::MulOrZero => Some(a.times(b, scales)),
+        Binary::Div | Binary::DivOrZero => Some(a.over(b, scales)),
+        Binary::And | Binary::Min | Binary::PlainMin => Some(Growth::smaller(op, a, b, scales)),
+        Binary::Or => Some(Growth::smaller(Binary::And, a.negated(), b.negated(), scales).negated()),
+        Binary::Max | Binary::PlainMax => {
+            Some(Growth::smaller(Binary::Min, a.negated(), b.negated(), scales).negated())
+        }
+        Binary::MinWeight | Binary::MaxWeight | Binary::AndWeight | Binary::OrWeight => {
+            Some(Growth::of_directions(op, a, b, scales))
+        }
+        Binary::Call(BinaryFunction::Atan2) => {
+            let angle = Growth::of_directions(op, a, b, scales);
+            let jumps = a.factor.contains(0.0) && b.factor.lo < 0.0;
+            Some(if jumps { Growth::number(cuts.part(angle.factor)) } else { angle })
+        }
+        Binary::Call(BinaryFunction::Pow) if b.factor.lo == b.factor.hi && b.degree == 0.0 => {
+            match forward::whole_exponent(b.factor) {
+                Some(exponent) => Some(a.to_the(exponent, scales)),
+                None if b.factor.lo.fract() == 0.0 => Some(Growth::UNKNOWN),
+                None => a.real_power(b.factor.lo, scales),
+            }
+        }
+        Binary::Call(BinaryFunction::Pow) => {
+            forward::binary(op, a.values(scales), b.values(scales)).range.map(Growth::number)
+        }
+    }
+}

@@ -1,0 +1,237 @@
+//! What a node is far from the origin: a power of the distance times a number in an interval.
+//!
+//! A point is written as p = s·u: its scale s is its largest coordinate, and the direction u lies on a face of the
+//! cube with corners at ±1. For all scales between 2^l₀ and 2^l₁ and all directions of a box, a node is s^degree times
+//! a factor of an interval. A sum has the larger of both degrees, and the other operand adds a part that dwindles with
+//! s, so a sixth power outgrows a fifth one: the intervals of values themselves are both infinite there.
+//!
+//! Programs overflow. A node that may have done so has the sign of its factor, and is larger than it should be; a sum
+//! in which it is the smaller operand is known only if the larger one is infinite, too.
+
+use super::forward::{self, POSITIVE};
+use super::sets::meet;
+use crate::interval::Interval;
+use crate::ir::op::Binary;
+
+/// The scales 2^l between two exponents.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Scales {
+    /// The smaller exponent.
+    pub from: f64,
+    /// The larger exponent.
+    pub to: f64,
+}
+
+/// A node far from the origin.
+#[derive(Debug, Clone, Copy)]
+pub struct Growth {
+    /// The power of the scale.
+    pub degree: f64,
+    /// What the power is multiplied with.
+    pub factor: Interval,
+    /// The exponent of the scale from which programs may have got an infinite value.
+    pub may_overflow: f64,
+    /// That from which the value is infinite, or no number, in any case.
+    pub overflows: f64,
+}
+
+/// Exponents of values that are far from the largest and the smallest numbers.
+const LARGE: f64 = 1000.0;
+const SMALL: f64 = -1000.0;
+
+/// Exponents from which all values are infinite.
+const INFINITE: f64 = 1026.0;
+
+/// Relative error of powers of the scale, whose exponents are rounded.
+const OF_SCALE: f64 = 1e-11;
+
+/// Rounding errors of an operation, and of the program's, in units in the last place.
+const ROUNDING: u32 = 4;
+
+impl Scales {
+    /// s to the power of a degree.
+    fn power(self, degree: f64) -> Interval {
+        if degree == 0.0 {
+            return Interval::point(1.0);
+        }
+        let (a, b) = ((degree * self.from).exp2(), (degree * self.to).exp2());
+        Interval { lo: a.min(b) * (1.0 - OF_SCALE), hi: a.max(b) * (1.0 + OF_SCALE) }
+    }
+}
+
+/// The two factors for the larger degree of two nodes.
+struct Aligned {
+    degree: f64,
+    factors: [Interval; 2],
+}
+
+impl Growth {
+    /// A number that does not grow.
+    pub fn number(value: Interval) -> Self {
+        let unknown = if value.is_bounded() { f64::INFINITY } else { f64::NEG_INFINITY };
+        Self { degree: 0.0, factor: value, may_overflow: unknown, overflows: f64::INFINITY }
+    }
+
+    /// A coordinate, from those of the directions.
+    pub fn coordinate(direction: Interval) -> Self {
+        Self { degree: 1.0, factor: direction, may_overflow: f64::INFINITY, overflows: f64::INFINITY }
+    }
+
+    /// Nothing is known.
+    pub const UNKNOWN: Self = Self {
+        degree: 0.0,
+        factor: Interval::ALL,
+        may_overflow: f64::NEG_INFINITY,
+        overflows: f64::INFINITY,
+    };
+
+    /// What is known together with the values for all points, of which the smaller ones are kept.
+    pub fn within(self, values: Interval, scales: Scales) -> Self {
+        let size = |factor: Interval, degree: f64| {
+            factor.lo.abs().max(factor.hi.abs()).log2() + degree * scales.from
+        };
+        if values.is_bounded() && (self.may_fail(scales) || size(values, 0.0) < size(self.factor, self.degree)) {
+            return Self::number(values);
+        }
+        match meet(self.factor, values) {
+            Some(factor) if self.degree == 0.0 => Self { factor, ..self },
+            Some(_) | None => self,
+        }
+    }
+
+    /// The values for all scales.
+    pub fn values(self, scales: Scales) -> Interval {
+        if self.may_overflow <= scales.to {
+            return Interval::ALL;
+        }
+        (self.factor * scales.power(self.degree)).widened(ROUNDING)
+    }
+
+    /// Whether it may be infinite, and what is computed from it may be no number.
+    pub fn may_fail(self, scales: Scales) -> bool {
+        self.may_overflow <= scales.to
+    }
+
+    /// With another factor and degree, after an operation of which the value is as large as that says. It is infinite
+    /// where operands are.
+    fn with(degree: f64, factor: Interval, operands: &[Self], scales: Scales) -> Self {
+        let exponents = |size: f64| [scales.from, scales.to].map(|l| size.log2() + degree * l);
+        // small values lose digits, or are zero
+        let rounded = |end: f64| {
+            let is_small = end != 0.0 && exponents(end.abs()).into_iter().any(|exponent| exponent < SMALL);
+            if is_small { [2.0 * end, 0.0] } else { [end, end] }
+        };
+        let ends = [rounded(factor.lo), rounded(factor.hi)].concat();
+        let factor = Interval::new(
+            ends.iter().copied().fold(f64::INFINITY, f64::min),
+            ends.iter().copied().fold(f64::NEG_INFINITY, f64::max),
+        );
+        let reaches = |size: f64, limit: f64| {
+            if !(size > 0.0) {
+                f64::INFINITY
+            } else if exponents(size)[0] >= limit || !size.is_finite() {
+                f64::NEG_INFINITY
+            } else if degree > 0.0 {
+                (limit - size.log2()) / degree
+            } else {
+                f64::INFINITY
+            }
+        };
+        let most = factor.lo.abs().max(factor.hi.abs());
+        let least = if factor.contains(0.0) { 0.0 } else { factor.lo.abs().min(factor.hi.abs()) };
+        let earliest = operands.iter().fold(f64::INFINITY, |earliest, of| earliest.min(of.may_overflow));
+        let overflows = if least.is_finite() { reaches(least, INFINITE) } else { f64::INFINITY };
+        Self { degree, factor, may_overflow: earliest.min(reaches(most, LARGE)), overflows }
+    }
+
+    fn aligned(a: Self, b: Self, scales: Scales) -> Aligned {
+        let degree = a.degree.max(b.degree);
+        let factors = [a, b].map(|of| of.factor * scales.power(of.degree - degree));
+        Aligned { degree, factors }
+    }
+
+    pub fn negated(self) -> Self {
+        Self { factor: -self.factor, ..self }
+    }
+
+    pub fn abs(self) -> Self {
+        Self { factor: self.factor.abs(), ..self }
+    }
+
+    /// A sum. Where one operand may have become infinite too early, the other decides only if it is infinite itself.
+    pub fn plus(self, other: Self, scales: Scales) -> Self {
+        let Aligned { degree, factors: [a, b] } = Self::aligned(self, other, scales);
+        let factor = (a + b).widened(ROUNDING);
+        let sum = Self::with(degree, factor, &[self, other], scales);
+        if factor.contains(0.0) {
+            return sum;
+        }
+        let has_sign = |of: Interval| if factor.lo > 0.0 { of.lo > 0.0 } else { of.hi < 0.0 };
+        let decides = |larger: Self, smaller: Self| {
+            smaller.may_overflow > scales.to || larger.overflows <= smaller.may_overflow
+        };
+        let is_known = match (has_sign(a), has_sign(b)) {
+            (true, true) => true,
+            (true, false) => decides(self, other),
+            (false, true) => decides(other, self),
+            (false, false) => false,
+        };
+        if is_known { sum } else { Self::UNKNOWN }
+    }
+
+    pub fn times(self, other: Self, scales: Scales) -> Self {
+        let factor = (self.factor * other.factor).widened(ROUNDING);
+        Self::with(self.degree + other.degree, factor, &[self, other], scales)
+    }
+
+    pub fn over(self, other: Self, scales: Scales) -> Self {
+        if other.factor.contains(0.0) || other.may_overflow <= scales.to {
+            return Self::UNKNOWN;
+        }
+        let factor = (self.factor / other.factor).widened(ROUNDING);
+        Self::with(self.degree - other.degree, factor, &[self, other], scales)
+    }
+
+    /// A whole power, which is above zero.
+    pub fn to_the(self, exponent: u32, scales: Scales) -> Self {
+        let factor = forward::power(self.factor, exponent).widened(ROUNDING.saturating_mul(exponent).min(999));
+        Self::with(self.degree * f64::from(exponent), factor, &[self], scales)
+    }
+
+    /// The power of a number that is not negative; `None` if there is none.
+    pub fn real_power(self, exponent: f64, scales: Scales) -> Option<Self> {
+        let base = meet(self.factor, POSITIVE)?;
+        if exponent < 0.0 && (base.lo == 0.0 || self.may_fail(scales)) {
+            return Some(Self::UNKNOWN);
+        }
+        let (a, b) = (libm::pow(base.lo, exponent), libm::pow(base.hi, exponent));
+        let factor = Interval { lo: a.min(b) * (1.0 - OF_SCALE), hi: a.max(b) * (1.0 + OF_SCALE) };
+        Some(Self::with(self.degree * exponent, factor, &[self], scales))
+    }
+
+    /// The smaller operand, or what has its sign and grows like the operands.
+    pub fn smaller(op: Binary, a: Self, b: Self, scales: Scales) -> Self {
+        let Aligned { degree, factors } = Self::aligned(a, b, scales);
+        let factor = forward::binary(op, factors[0], factors[1]).range.unwrap_or(Interval::ALL);
+        // an infinite operand is not always chosen
+        let operands = [a, b];
+        let found = Self::with(degree, factor.widened(ROUNDING), &operands, scales);
+        // programs find the sign of what dwindles, too
+        let (mut factor, least) = (found.factor, f64::MIN_POSITIVE);
+        if operands.iter().any(|of| of.factor.hi < 0.0) {
+            factor = Interval { lo: factor.lo.min(-least), hi: factor.hi.min(-least) };
+        } else if operands.iter().all(|of| of.factor.lo > 0.0) {
+            factor = Interval { lo: factor.lo.max(least), hi: factor.hi.max(least) };
+        }
+        Self { factor, overflows: f64::INFINITY, ..found }
+    }
+
+    /// An operation that has the same value where both operands are k times as large.
+    pub fn of_directions(op: Binary, a: Self, b: Self, scales: Scales) -> Self {
+        if a.may_fail(scales) || b.may_fail(scales) {
+            return Self::UNKNOWN;
+        }
+        let Aligned { factors: [a, b], .. } = Self::aligned(a, b, scales);
+        Self::number(forward::binary(op, a, b).range.unwrap_or(Interval::ALL))
+    }
+}
