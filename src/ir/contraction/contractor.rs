@@ -149,6 +149,11 @@ impl Contractor {
         self.rules.len()
     }
 
+    /// Whether the root needs an angle that jumps.
+    pub fn has_angles(&self) -> bool {
+        !self.angles.is_empty()
+    }
+
     /// Runs forwards and backwards. `None` if the root is positive nowhere, true if it is positive
     /// everywhere.
     pub(super) fn pass(&self, region: &Region<'_>, negated: bool, scratch: &mut Scratch) -> Option<bool> {

@@ -4,7 +4,7 @@ use super::contractor::{Contractor, Operand, SCRATCH, Scratch, Wanted};
 use super::forward;
 use super::growth::{Growth, Scales};
 use super::rule::{Degree, Rule};
-use super::sets::Contracted;
+use super::sets::{Contracted, meet, part_of_angle, parts_of_angle};
 use crate::geom::Aabb;
 use crate::interval::Interval;
 use crate::ir::bounds::range::{Affine, Region};
@@ -12,8 +12,8 @@ use crate::ir::function::BinaryFunction;
 use crate::ir::graph::{Axis, Expr, Node};
 use crate::ir::op::{Binary, Unary};
 
-/// Cuts of angles that are looked at from both sides, each apart from the others.
-const MOST_CUTS: u32 = 3;
+/// Choices of the parts of several angles.
+const MOST_CHOICES: usize = 64;
 
 /// Points far from the origin: s·u for all scales s and all directions u.
 #[derive(Debug, Clone, Copy)]
@@ -33,29 +33,41 @@ impl Far {
     }
 }
 
-/// The angles around the z axis, or another one, that jump among the points.
+/// The angles that jump among the points, or go all around, and the parts of them that are looked at alone.
 #[derive(Default)]
 struct Cuts {
-    /// A bit for each, in the order of the nodes: whether it is taken from the side where it is positive. `None` for
-    /// both.
-    sides: Option<u32>,
-    /// How many have a bit.
-    counted: u32,
-    met: u32,
+    /// The node of each, the number of its parts, and the one that is meant.
+    parts: Vec<(usize, u32, u32)>,
+    /// The nodes that were met, with the number of their parts.
+    met: Vec<(usize, u32)>,
+    /// Whether no point has angles in the parts that are meant.
+    is_impossible: bool,
 }
 
 impl Cuts {
-    /// The part of an angle that jumps at its cut.
-    fn part(&mut self, angle: Interval) -> Interval {
-        let number = self.met;
-        self.met += 1;
-        match self.sides {
-            Some(sides) if number < self.counted && sides >> number & 1 == 1 => {
-                Interval { lo: angle.lo.max(0.0), ..angle }
+    /// The angle atan2(a, b) of a node that jumps.
+    fn part(&mut self, node: usize, angle: Interval, [a, b]: [Interval; 2]) -> Interval {
+        self.met.push((node, parts_of_angle(b)));
+        let Some(&(_, count, part)) = self.parts.iter().find(|(of, ..)| *of == node) else { return angle };
+        let found = meet(angle, part_of_angle([a, b], (part, count)));
+        self.is_impossible |= found.is_none();
+        found.unwrap_or(angle)
+    }
+
+    /// All choices of a part of each angle that was met; of some of them, where there are many.
+    fn choices(&self) -> Vec<Self> {
+        let mut choices = vec![Self::default()];
+        for &(node, count) in &self.met {
+            if choices.len() * count as usize > MOST_CHOICES {
+                break;
             }
-            Some(_) if number < self.counted => Interval { hi: angle.hi.min(0.0), ..angle },
-            Some(_) | None => angle,
+            let with = |choice: &Self, part: u32| Self {
+                parts: [&choice.parts[..], &[(node, count, part)]].concat(),
+                ..Self::default()
+            };
+            choices = choices.iter().flat_map(|choice| (0..count).map(move |part| with(choice, part))).collect();
         }
+        choices
     }
 }
 
@@ -70,16 +82,15 @@ impl Contractor {
             }
             let mut cuts = Cuts::default();
             let verdict = self.sign_far(wanted.negated, far, scratch, &mut cuts);
-            if verdict != Contracted::Somewhere || cuts.met == 0 {
+            if verdict != Contracted::Somewhere || cuts.met.is_empty() {
                 return verdict;
             }
-            // each angle is taken from one side of its cut, then from the other
-            let counted = cuts.met.min(MOST_CUTS);
-            let is_nowhere = |sides: u32| {
-                let mut cuts = Cuts { sides: Some(sides), counted, met: 0 };
-                self.sign_far(wanted.negated, far, scratch, &mut cuts) == Contracted::Nowhere
+            let mut choices = cuts.choices();
+            let is_nowhere = |cuts: &mut Cuts| {
+                let verdict = self.sign_far(wanted.negated, far, scratch, cuts);
+                cuts.is_impossible || verdict == Contracted::Nowhere
             };
-            if (0..1 << counted).all(is_nowhere) { Contracted::Nowhere } else { Contracted::Somewhere }
+            if choices.iter_mut().all(is_nowhere) { Contracted::Nowhere } else { Contracted::Somewhere }
         })
     }
 
@@ -141,7 +152,7 @@ impl Contractor {
                 Some(Growth::coordinate(Interval { lo: min[axis], hi: max[axis] }))
             }
             Rule::Plain(Expr::Unary(op, a)) => unary(op, of(a), scales),
-            Rule::Plain(Expr::Binary(op, a, b)) => binary(op, of(a), of(b), scales, cuts),
+            Rule::Plain(Expr::Binary(op, a, b)) => binary(op, [of(a), of(b)], scales, (i, cuts)),
             // what is known of them does not grow
             Rule::Plain(Expr::Lookup(..) | Expr::Constant(_) | Expr::Parameter(_) | Expr::Uniform(_)) => {
                 Some(Growth::UNKNOWN)
@@ -165,7 +176,7 @@ fn unary(op: Unary, a: Growth, scales: Scales) -> Option<Growth> {
     }
 }
 
-fn binary(op: Binary, a: Growth, b: Growth, scales: Scales, cuts: &mut Cuts) -> Option<Growth> {
+fn binary(op: Binary, [a, b]: [Growth; 2], scales: Scales, (node, cuts): (usize, &mut Cuts)) -> Option<Growth> {
     match op {
         Binary::Add => Some(a.plus(b, scales)),
         Binary::Sub => Some(a.plus(b.negated(), scales)),
@@ -183,8 +194,11 @@ fn binary(op: Binary, a: Growth, b: Growth, scales: Scales, cuts: &mut Cuts) -> 
         }
         Binary::Call(BinaryFunction::Atan2) => {
             let angle = Growth::of_directions(op, a, b, scales);
-            let jumps = a.factor.contains(0.0) && b.factor.lo < 0.0;
-            Some(if jumps { Growth::number(cuts.part(angle.factor)) } else { angle })
+            let jumps = a.factor.contains(0.0) && b.factor.lo <= 0.0;
+            let is_known = !a.may_fail(scales) && !b.may_fail(scales);
+            let (factors, _) = Growth::aligned(a, b, scales);
+            let part = |cuts: &mut Cuts| Growth::number(cuts.part(node, angle.factor, factors));
+            Some(if jumps && is_known { part(cuts) } else { angle })
         }
         Binary::Call(BinaryFunction::Pow) if b.factor.lo == b.factor.hi && b.degree == 0.0 => {
             match forward::whole_exponent(b.factor) {

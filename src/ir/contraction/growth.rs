@@ -59,12 +59,6 @@ impl Scales {
     }
 }
 
-/// The two factors for the larger degree of two nodes.
-struct Aligned {
-    degree: f64,
-    factors: [Interval; 2],
-}
-
 impl Growth {
     /// A number that does not grow.
     pub fn number(value: Interval) -> Self {
@@ -87,16 +81,14 @@ impl Growth {
 
     /// What is known together with the values for all points, of which the smaller ones are kept.
     pub fn within(self, values: Interval, scales: Scales) -> Self {
+        if self.degree == 0.0 && !self.may_fail(scales) {
+            return meet(self.factor, values).map_or(self, |factor| Self { factor, ..self });
+        }
         let size = |factor: Interval, degree: f64| {
             factor.lo.abs().max(factor.hi.abs()).log2() + degree * scales.from
         };
-        if values.is_bounded() && (self.may_fail(scales) || size(values, 0.0) < size(self.factor, self.degree)) {
-            return Self::number(values);
-        }
-        match meet(self.factor, values) {
-            Some(factor) if self.degree == 0.0 => Self { factor, ..self },
-            Some(_) | None => self,
-        }
+        let is_smaller = size(values, 0.0) < size(self.factor, self.degree);
+        if values.is_bounded() && (self.may_fail(scales) || is_smaller) { Self::number(values) } else { self }
     }
 
     /// The values for all scales.
@@ -144,10 +136,10 @@ impl Growth {
         Self { degree, factor, may_overflow: earliest.min(reaches(most, LARGE)), overflows }
     }
 
-    fn aligned(a: Self, b: Self, scales: Scales) -> Aligned {
+    /// The factors of two nodes for the larger of their degrees, and that degree.
+    pub fn aligned(a: Self, b: Self, scales: Scales) -> ([Interval; 2], f64) {
         let degree = a.degree.max(b.degree);
-        let factors = [a, b].map(|of| of.factor * scales.power(of.degree - degree));
-        Aligned { degree, factors }
+        ([a, b].map(|of| of.factor * scales.power(of.degree - degree)), degree)
     }
 
     pub fn negated(self) -> Self {
@@ -160,7 +152,7 @@ impl Growth {
 
     /// A sum. Where one operand may have become infinite too early, the other decides only if it is infinite itself.
     pub fn plus(self, other: Self, scales: Scales) -> Self {
-        let Aligned { degree, factors: [a, b] } = Self::aligned(self, other, scales);
+        let ([a, b], degree) = Self::aligned(self, other, scales);
         let factor = (a + b).widened(ROUNDING);
         let sum = Self::with(degree, factor, &[self, other], scales);
         if factor.contains(0.0) {
@@ -211,7 +203,7 @@ impl Growth {
 
     /// The smaller operand, or what has its sign and grows like the operands.
     pub fn smaller(op: Binary, a: Self, b: Self, scales: Scales) -> Self {
-        let Aligned { degree, factors } = Self::aligned(a, b, scales);
+        let (factors, degree) = Self::aligned(a, b, scales);
         let factor = forward::binary(op, factors[0], factors[1]).range.unwrap_or(Interval::ALL);
         // an infinite operand is not always chosen
         let operands = [a, b];
@@ -231,7 +223,7 @@ impl Growth {
         if a.may_fail(scales) || b.may_fail(scales) {
             return Self::UNKNOWN;
         }
-        let Aligned { factors: [a, b], .. } = Self::aligned(a, b, scales);
+        let ([a, b], _) = Self::aligned(a, b, scales);
         Self::number(forward::binary(op, a, b).range.unwrap_or(Interval::ALL))
     }
 }

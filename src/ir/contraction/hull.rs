@@ -2,18 +2,17 @@
 
 use smallvec::SmallVec;
 
-use super::contractor::{Contractor, SCRATCH, Scratch, Wanted};
+use super::contractor::{Angle, Contractor, SCRATCH, Scratch, Wanted};
 use super::forms;
 use super::linear::LinearForm;
 use super::quadric::ellipsoid;
-use super::sets::Contracted;
+use super::sets::{Contracted, part_of_angle, parts_of_angle};
 use crate::geom::Aabb;
 use crate::interval::Interval;
 use crate::ir::bounds::range::Region;
-use crate::ir::graph::Node;
 
-/// Cuts of which both sides are looked at.
-const MOST_CUTS: usize = 2;
+/// Choices of the parts of angles that are looked at.
+const MOST_CHOICES: u32 = 32;
 
 impl Contractor {
     /// Cuts off parts of a box where the formula is not positive. With `found` it also returns the values
@@ -30,7 +29,7 @@ impl Contractor {
         self.contract_given(&[], wanted, space, found)
     }
 
-    /// Cuts off parts of a box in which angles may jump: what is left on either side of each cut is found alone.
+    /// Cuts off parts of a box in which angles may jump: what is left for each part of them is found alone.
     fn contract_beside_cuts(&self, wanted: &Wanted<'_>, space: &mut Aabb) -> Contracted {
         SCRATCH.with_borrow_mut(|scratch| {
             let before = *space;
@@ -40,14 +39,26 @@ impl Contractor {
                 return Contracted::Nowhere;
             }
             let cuts = self.cuts(scratch);
+            let operands = |angle: &Angle| [angle.a, angle.b].map(|node| scratch.values[node.index()]);
+            let ranges: Vec<[Interval; 2]> = self.angles.iter().map(operands).collect();
+            let choices: u32 = cuts.iter().map(|(_, parts)| parts).product();
             let (mut hull, mut filled) = (Aabb::EMPTY, 0);
-            let sides = 1_u32 << cuts.len();
-            for side in 0..sides {
+            for choice in 0..choices {
                 scratch.known.clear();
-                for (k, cut) in cuts.iter().enumerate() {
-                    let half = if side >> k & 1 == 0 { Interval { lo: 0.0, ..Interval::ALL } } else { Interval { hi: 0.0, ..Interval::ALL } };
-                    let nodes = self.angles.iter().filter(|angle| angle.a == *cut).map(|angle| angle.node);
-                    scratch.known.extend(nodes.chain([*cut]).map(|node| (node, half)));
+                let mut left = choice;
+                for &(cut, parts) in &cuts {
+                    let part = left % parts;
+                    left /= parts;
+                    let all = Interval::ALL;
+                    let half = if 2 * part < parts { Interval { hi: 0.0, ..all } } else { Interval { lo: 0.0, ..all } };
+                    scratch.known.push((cut.a, half));
+                    for (angle, &ranges) in self.angles.iter().zip(&ranges) {
+                        if angle.node == cut.node {
+                            scratch.known.push((angle.node, part_of_angle(ranges, (part, parts))));
+                        } else if angle.a == cut.a {
+                            scratch.known.push((angle.node, half));
+                        }
+                    }
                 }
                 scratch.known.sort_by_key(|(node, _)| node.index());
                 let mut own = before;
@@ -64,7 +75,7 @@ impl Contractor {
                     }
                 }
             }
-            if filled == sides {
+            if filled == choices {
                 return Contracted::Everywhere;
             }
             *space = hull;
@@ -72,13 +83,17 @@ impl Contractor {
         })
     }
 
-    /// The numbers at whose zeros angles jump in a box, a few of them.
-    fn cuts(&self, scratch: &Scratch) -> SmallVec<[Node; MOST_CUTS]> {
-        let mut cuts = SmallVec::new();
+    /// A few angles that jump in a box, at the zeros of different numbers, and the number of their parts.
+    fn cuts(&self, scratch: &Scratch) -> SmallVec<[(Angle, u32); 2]> {
+        let mut cuts: SmallVec<[(Angle, u32); 2]> = SmallVec::new();
+        let mut choices = 1;
         for angle in &self.angles {
             let [a, b] = [angle.a, angle.b].map(|node| scratch.values[node.index()]);
-            if a.contains(0.0) && b.lo < 0.0 && !cuts.contains(&angle.a) && cuts.len() < MOST_CUTS {
-                cuts.push(angle.a);
+            let is_new = cuts.iter().all(|(cut, _)| cut.a != angle.a);
+            let parts = parts_of_angle(b);
+            if a.contains(0.0) && b.lo <= 0.0 && is_new && choices * parts <= MOST_CHOICES {
+                choices *= parts;
+                cuts.push((*angle, parts));
             }
         }
         cuts
@@ -129,7 +144,7 @@ impl Contractor {
 mod tests {
     use super::super::linear::{contract_linear, contract_linear_around};
     use super::*;
-    use crate::ir::graph::{Axis, Graph};
+    use crate::ir::graph::{Axis, Graph, Node};
     use crate::ir::{Binary, Interpreter, Unary, UnaryFunction};
     use glam::DVec3;
     use proptest::prelude::*;

@@ -8,6 +8,9 @@ use super::whole::WholeFormula;
 use crate::geom::Aabb;
 use crate::solid::construction::Solid;
 
+/// Longer formulas are not searched as one if their leaves were.
+const MOST_NODES: usize = 2000;
+
 impl Solid {
     /// Where the solid is; found on first use, then kept.
     pub fn bounds(&self) -> &Bounds {
@@ -38,10 +41,22 @@ impl Solid {
         })
     }
 
+    /// What is found from the formula as one, if angles occur in it: around an axis, leaves alone are undecided for
+    /// different angles.
+    fn with_common_angles(&self, found: Option<Found>) -> Option<Found> {
+        let found = found?;
+        let is_open = Side::all().any(|side| side.is_open(&found.hull));
+        if found.is_tight || is_open || self.formula().0.len() > MOST_NODES {
+            return Some(found);
+        }
+        let whole = WholeFormula::of(self, false);
+        if whole.has_angles() { search(&whole, found.hull) } else { Some(found) }
+    }
+
     /// The bounds of the part of the solid in a box.
     pub(super) fn found_within(&self, around: Aabb) -> FoundBounds {
         let found = match self.parts_with_hulls() {
-            Some(parts) => search(&Tree { words: parts.words.clone(), parts }, around),
+            Some(parts) => self.with_common_angles(search(&Tree { words: parts.words.clone(), parts }, around)),
             None => search(&WholeFormula::of(self, false), around),
         };
         let Some(Found { hull, is_tight }) = found else {

@@ -40,6 +40,11 @@ impl WholeFormula {
         Self { contractor: Contractor::new(graph, root), time, negated, hull }
     }
 
+    /// Whether it needs an angle that jumps.
+    pub fn has_angles(&self) -> bool {
+        self.contractor.has_angles()
+    }
+
     fn contract(&self, space: &mut Aabb, effort: Effort) -> Contracted {
         let wanted =
             Wanted { region: Region { time: self.time, ..Region::of(&Aabb::EMPTY) }, negated: self.negated };
