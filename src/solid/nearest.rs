@@ -126,11 +126,14 @@ const MOST_ROUNDS: usize = 100;
 const FAILURES: u32 = 2;
 const GOLDEN_ANGLE: f64 = 2.399_963_229_728_653;
 
-/// Work that turning may take, so that cells find what it misses.
-const WORK_OF_TURNS: usize = MOST_WORK / 5;
+/// One part in this many of the work that is left: what turning may take each time, so that cells find what it misses.
+const PARTS_OF_WORK: usize = 8;
 
 /// The part of its length to which a ray is halved around the surface.
 const FINE: f64 = 1e-12;
+
+/// That part as long as cells are looked at: rays need only be compared. At last the nearest one is halved on.
+const COARSE: f64 = 0.1 * GAP;
 
 /// That part while rays are turned, over the angle of the turn: they need only be compared.
 const FINE_OF_TURN: f64 = 1e-6;
@@ -191,7 +194,7 @@ impl Distances {
             point: DVec3::NAN,
             work_of_sign: self.work_of_sign,
             work: Cell::new(MOST_WORK),
-            fineness: FINE,
+            fineness: COARSE,
         };
         self.rays(&mut best);
         // where a side ends, all that may hold it is searched for less
@@ -203,6 +206,7 @@ impl Distances {
         let reach = best.distance.min(2.0 * SEARCH_RADIUS);
         let mut around = Aabb::new(p - DVec3::splat(reach), p + DVec3::splat(reach));
         let Some(known) = target.shrink(&target.everything(), &mut around, Effort::Large) else {
+            best.refine();
             return (reach, best.distance, best.point);
         };
         if !best.distance.is_finite() {
@@ -219,6 +223,7 @@ impl Distances {
         while let Some(Queued { rank, space, known }) = queue.pop() {
             let distance = -rank;
             if distance >= (1.0 - GAP) * best.distance || cells == MOST_CELLS || best.is_spent() {
+                best.refine();
                 return (distance.min(best.distance).min(reach), best.distance, best.point);
             }
             cells += 1;
@@ -236,6 +241,7 @@ impl Distances {
                 }
             }
         }
+        best.refine();
         (best.distance.min(reach), best.distance, best.point)
     }
 
@@ -405,7 +411,7 @@ impl Best<'_> {
     /// along edges.
     fn turn(&mut self) {
         let (mut angle, mut failures) = (WIDEST_TURN, 0);
-        let enough = self.work.get().saturating_sub(WORK_OF_TURNS);
+        let enough = self.work.get() - self.work.get() / PARTS_OF_WORK;
         for round in 0..MOST_ROUNDS {
             if !self.distance.is_finite() || angle <= LEAST_TURN || self.work.get() <= enough {
                 break;
@@ -414,7 +420,7 @@ impl Best<'_> {
             if direction == DVec3::ZERO {
                 break;
             }
-            self.fineness = (FINE_OF_TURN * angle).max(FINE);
+            self.fineness = (FINE_OF_TURN * angle).clamp(FINE, COARSE);
             let (u, v) = direction.any_orthonormal_pair();
             for k in 0..TURNS {
                 let turned =
@@ -428,6 +434,11 @@ impl Best<'_> {
                 (angle, failures) = (0.5 * angle, 0);
             }
         }
+        self.fineness = COARSE;
+    }
+
+    /// Halves the nearest ray as far as numbers allow.
+    fn refine(&mut self) {
         self.fineness = FINE;
         if self.point.is_finite() {
             self.try_ray(self.point);

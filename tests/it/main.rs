@@ -18,6 +18,7 @@ mod driven;
 mod drops;
 mod editors;
 mod examples;
+mod far_bounds;
 mod files;
 mod fillings;
 mod findings;

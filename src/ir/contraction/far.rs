@@ -212,3 +212,73 @@ fn binary(op: Binary, [a, b]: [Growth; 2], scales: Scales, (node, cuts): (usize,
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::hull::tests::formula;
+    use super::*;
+    use crate::ir::Interpreter;
+    use glam::DVec3;
+    use proptest::prelude::*;
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(20_000))]
+        /// Whatever the operations: what is said of far points holds at each of them, however far.
+        #[test]
+        fn the_sign_far_out_is_that_of_its_points(
+            steps in prop::collection::vec((0..200_usize, 0..4_usize, 0..9_usize, -3.0..3.0f64), 1..9),
+            (axis, upper) in (0..3_usize, any::<bool>()),
+            lo in prop::array::uniform3(-1.0..1.0f64),
+            size in prop_oneof![prop::array::uniform3(0.0..0.5f64), prop::array::uniform3(0.0..0.01f64)],
+            (from, height) in (-100.0..200.0f64, prop_oneof![0.0..300.0f64, 0.0..3.0f64]),
+            points in prop::collection::vec((prop::array::uniform3(0.0..=1.0f64), 0.0..=1.0f64), 24),
+            negated: bool,
+        ) {
+            let (graph, root) = formula(&steps);
+            let mut min = DVec3::from_array(lo);
+            let mut max = (min + DVec3::from_array(size)).min(DVec3::ONE);
+            (min[axis], max[axis]) = if upper { (1.0, 1.0) } else { (-1.0, -1.0) };
+            let directions = Aabb::new(min, max);
+            let scales = Scales { from: from.round(), to: (from + height).min(250.0).max(from).round() };
+            let wanted = Wanted { region: Region::of(&Aabb::EMPTY), negated };
+            let verdict = Contractor::new(&graph, root).far(&wanted, &Far { directions, scales });
+            let interpreter = Interpreter::new(&graph, &[root]);
+            for (at, height) in points {
+                let direction = (min + (max - min) * DVec3::from_array(at)).clamp(min, max);
+                let p = direction * (scales.from + (scales.to - scales.from) * height).exp2();
+                let mut omega = [0.0];
+                interpreter.eval_f64(p.to_array(), &mut omega);
+                let inside = if negated { omega[0] < 0.0 } else { omega[0] > 0.0 };
+                match verdict {
+                    Contracted::Nowhere => prop_assert!(!inside, "{p} is inside, {omega:?}"),
+                    Contracted::Everywhere => prop_assert!(inside, "{p} is not inside, {omega:?}"),
+                    Contracted::Somewhere => {}
+                }
+            }
+        }
+    }
+
+    /// x·10⁻³⁰⁰·x¹⁰ overflows before it is larger than x⁶ − 1 where it stands: programs find the other sign there.
+    #[test]
+    fn a_product_that_overflows_early_decides_nothing() {
+        let mut graph = crate::ir::Graph::default();
+        let x = graph.coordinate(Axis::X);
+        let small = graph.constant(1e-300);
+        let power = |graph: &mut crate::ir::Graph, exponent: u32| {
+            (1..exponent).fold(x, |product, _| graph.binary(Binary::Mul, product, x))
+        };
+        let tenth = power(&mut graph, 10);
+        let early = graph.binary(Binary::Mul, tenth, small);
+        let sixth = power(&mut graph, 6);
+        let root = graph.binary(Binary::Sub, early, sixth);
+        let contractor = Contractor::new(&graph, root);
+        let wanted = Wanted { region: Region::of(&Aabb::EMPTY), negated: false };
+        let directions = Aabb::new(DVec3::new(1.0, -1.0, -1.0), DVec3::ONE);
+        let verdict = |from: f64, to: f64| {
+            contractor.far(&wanted, &Far { directions, scales: Scales { from, to } })
+        };
+        // 10⁻³⁰⁰·x⁴ < 1 up to x = 10⁷⁵, but x¹⁰ is infinite from 10³¹ on
+        assert_eq!(verdict(10.0, 90.0), Contracted::Nowhere);
+        assert_eq!(verdict(10.0, 120.0), Contracted::Somewhere);
+    }
+}

@@ -141,7 +141,7 @@ impl Contractor {
 }
 
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
     use super::super::linear::{contract_linear, contract_linear_around};
     use super::*;
     use crate::ir::graph::{Axis, Graph, Node};
@@ -152,7 +152,7 @@ mod tests {
     const AXES: [Axis; 3] = Axis::SPACE;
 
     /// Random formulas: each step applies an operation to two of the nodes made before.
-    fn formula(steps: &[(usize, usize, usize, f64)]) -> (Graph, Node) {
+    pub fn formula(steps: &[(usize, usize, usize, f64)]) -> (Graph, Node) {
         let mut graph = Graph::default();
         let mut nodes: Vec<Node> = AXES.iter().map(|&axis| graph.coordinate(axis)).collect();
         let unary: Vec<Unary> = Unary::all().collect();
