@@ -80,13 +80,16 @@ const MOST_WORK: usize = 100_000;
 const WALKS_OF_CELL: usize = 4;
 
 /// Operations of machine code that take as long as a node of a formula whose range is found.
-const OPERATIONS_OF_NODE: usize = 8;
+const OPERATIONS_OF_NODE: usize = 16;
 
 /// Length of the first ray where nothing is known of the distance, m.
 const SHORTEST_RAY: f64 = 1e-6;
 
 /// Directions that are tried where neither the normal nor an axis meets the surface.
 const ALL_AROUND: usize = 64;
+
+/// Work that longer and longer rays may take: cells around the point find what they miss.
+const WORK_OF_RAYS: usize = MOST_WORK / 4;
 
 /// Number of times that the length of a ray is doubled.
 const DOUBLINGS: i32 = 60;
@@ -302,6 +305,7 @@ impl Distances {
 
     /// Tries rays, each time twice as long, until one of them meets the surface.
     fn longer_rays(best: &mut Best<'_>, first: f64, directions: &[DVec3]) {
+        let enough = best.work.get().saturating_sub(WORK_OF_RAYS);
         for doubling in 0..DOUBLINGS {
             let reach = first * f64::exp2(f64::from(doubling));
             for &direction in directions {
@@ -309,7 +313,7 @@ impl Distances {
                     best.try_ray(best.p + reach * direction);
                 }
             }
-            if best.distance.is_finite() || best.is_spent() {
+            if best.distance.is_finite() || best.work.get() <= enough {
                 break;
             }
         }
@@ -403,9 +407,10 @@ impl Best<'_> {
         // the additive recurrence in three dimensions, by the root of g⁴ = g + 1
         const G: f64 = 1.220_744_084_605_759_5;
         let steps = DVec3::new(1.0 / G, 1.0 / (G * G), 1.0 / (G * G * G));
+        let enough = self.work.get().saturating_sub(WORK_OF_RAYS);
         for k in 0..SCATTERED {
             let share = (0.5 + steps * f64::from(k)).fract();
-            if self.is_spent() {
+            if self.work.get() <= enough {
                 return;
             }
             self.try_ray(space.min + share * space.size());
@@ -416,7 +421,13 @@ impl Best<'_> {
     fn try_places(&mut self, places: &[DVec3]) {
         let mut places = places.to_vec();
         places.sort_by(|a, b| self.p.distance_squared(*a).total_cmp(&self.p.distance_squared(*b)));
-        places.into_iter().for_each(|place| self.try_ray(place));
+        let enough = self.work.get().saturating_sub(WORK_OF_RAYS);
+        for place in places {
+            if self.distance.is_finite() && self.work.get() <= enough {
+                return;
+            }
+            self.try_ray(place);
+        }
     }
 
     /// Follows ω towards the other side, with steps that get longer: from the tip of a sharp edge into the

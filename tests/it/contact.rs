@@ -209,3 +209,40 @@ fn pawn_distances_far_from_the_wall() {
     );
     assert!(errors[p95] < 5e-3 && gaps[p95] < 1e-2, "{} {}", errors[p95], gaps[p95]);
 }
+
+/// Where the slope of a formula has no end, or is that of another branch, value over slope would be a thousandth of the
+/// distance, or less: around the axis of an angle, and on the crease of a root.
+#[test]
+fn contacts_at_axes_and_creases_are_as_far_as_the_surface() {
+    let star = "abs(x)^0.5 + abs(y)^0.5 + abs(z)^0.5 <= 1";
+    let lens = "sqrt(abs(x)) + y^2 + z^2 <= 1";
+    let flower = "0.5 - abs(hypot(x, y) - 2 - 0.3*cos(3*atan2(y, x)))";
+    let bent = "box([-1,-0.2,-0.3],[1,0.2,0.3]).bend(1.5)";
+    for (definition, p, distance, normal) in [
+        // the tips lie on the axes, the hollows where the coordinates are equal: 3√t = 1
+        (star, [0.0, 0.0, 1.1], 0.1, Some(DVec3::Z)),
+        (star, [1e-9, 0.0, 1.1], 0.1, Some(DVec3::Z)),
+        (star, [0.0, 0.0, 0.0], -(3_f64.sqrt() / 9.0), None),
+        (star, [0.1, 0.0, 1.1], 0.02_f64.sqrt(), None),
+        (lens, [0.0, 1.1, 0.0], 0.1, Some(DVec3::Y)),
+        (lens, [1e-9, 1.1, 0.0], 0.1, Some(DVec3::Y)),
+        // 1.5 + 0.3 cos 3θ is 1.2 at least
+        (flower, [0.0, 0.0, 0.0], 1.2, None),
+        (flower, [1e-9, 0.0, 0.0], 1.2, None),
+        // the plate is a sector of the ring between 1.2 and 1.8 from the axis
+        (bent, [0.0, 0.0, 1.5], 1.2, None),
+        (bent, [1e-9, 0.0, 1.5], 1.2, None),
+    ] {
+        let (solid, p) = (solid(definition), DVec3::from_array(p));
+        let found = solid.contact(p);
+        // what is searched for is right to a ten-thousandth, and the tip of a needle is found from a little inside
+        let context = || format!("{definition} at {p}: {found:?}");
+        assert!((found.distance - distance).abs() < 2e-3 * distance.abs(), "{}", context());
+        assert!(normal.is_none_or(|normal| found.normal.distance(normal) < 0.02), "{}", context());
+        let mut columns = [[0.0]; 5];
+        let [d, x, y, z, k] = &mut columns;
+        solid.contact_many([&[p.x], &[p.y], &[p.z]], [d, x, y, z, k]);
+        let expected = [found.distance, found.normal.x, found.normal.y, found.normal.z, found.mean_curvature];
+        assert_eq!(columns.map(|column| column[0]), expected, "{}", context());
+    }
+}

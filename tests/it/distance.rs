@@ -203,3 +203,37 @@ fn clearances_are_never_too_long() {
         }
     }
 }
+
+/// A coil that is cut at its ends: the flat end is nearer than the side of any turn, and each sign takes hundreds of
+/// capsules. The truth is the nearest of points of the end, 1e-5 apart, which lie within the radius of the helix.
+#[test]
+fn the_cut_end_of_a_coil_is_found() {
+    let distances = Distances::new(&solid("sweep(helix(0.02, 0.006, 8), 0.0015) and 0 <= z <= 0.048"));
+    let helix = |angle: f64| {
+        DVec3::new(0.02 * angle.cos(), 0.02 * angle.sin(), 0.006 * angle / std::f64::consts::TAU)
+    };
+    let mut end = Vec::new();
+    for i in 0..4000 {
+        let angle = 5e-4 * f64::from(i);
+        for k in -160..=160 {
+            let radius = 0.02 + 1e-5 * f64::from(k);
+            let q = DVec3::new(radius * angle.cos(), radius * angle.sin(), 0.0);
+            let near = |j: i32| helix((angle + 2e-3 * f64::from(j)).max(0.0)).distance(q) <= 0.0015;
+            if (-10..=10).any(near) {
+                end.push(q);
+            }
+        }
+    }
+    for p in [
+        [0.012229411657852615, 0.0138476527057061, -0.0018246409379967053],
+        [0.015, 0.01, -0.002],
+        [0.01, 0.004, -0.004],
+        [0.02, 0.001, -0.003],
+    ] {
+        let p = DVec3::from_array(p);
+        let truth = end.iter().map(|q| q.distance(p)).fold(f64::INFINITY, f64::min);
+        let Distance { estimate, clearance, .. } = distances.at(p);
+        assert!(clearance <= truth && estimate >= truth - 2e-5, "{p}: {clearance} … {estimate} for {truth}");
+        assert!(estimate <= 1.02 * truth, "{p}: {estimate} for {truth}");
+    }
+}

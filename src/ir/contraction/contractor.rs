@@ -83,6 +83,22 @@ thread_local! {
     pub(super) static SCRATCH: RefCell<Scratch> = RefCell::default();
 }
 
+/// The angles without which the root is no number.
+fn angles(graph: &Graph, needed: &[bool]) -> Vec<Angle> {
+    let angle = |(node, expr): (Node, Expr)| match expr {
+        Expr::Binary(Binary::Call(BinaryFunction::Atan2), a, b) => Some(Angle { node, a, b }),
+        Expr::Unary(..)
+        | Expr::Binary(..)
+        | Expr::Constant(_)
+        | Expr::Coordinate(_)
+        | Expr::Parameter(_)
+        | Expr::Uniform(_)
+        | Expr::Lookup(..) => None,
+    };
+    let is_needed = |angle: &Angle| needed[angle.node.index()] && needed[angle.a.index()];
+    graph.nodes().filter_map(angle).filter(is_needed).collect()
+}
+
 impl Contractor {
     /// Prepares a root of a graph.
     pub fn new(graph: &Graph, root: Node) -> Self {
@@ -115,20 +131,7 @@ impl Contractor {
         let forms = graph.nodes().filter(is_form).map(|(node, _)| node).collect();
         let coordinates = Axis::SPACE.map(|axis| graph.find(Expr::Coordinate(axis)));
         let tables = graph.tables().clone();
-        let angle = |(node, expr): (Node, Expr)| match expr {
-            Expr::Binary(Binary::Call(BinaryFunction::Atan2), a, b) => Some(Angle { node, a, b }),
-            Expr::Unary(..)
-            | Expr::Binary(..)
-            | Expr::Constant(_)
-            | Expr::Coordinate(_)
-            | Expr::Parameter(_)
-            | Expr::Uniform(_)
-            | Expr::Lookup(..) => None,
-        };
-        // where one of these is no number, the root is none
-        let is_needed = |angle: &Angle| needed[angle.node.index()] && needed[angle.a.index()];
-        let angles =
-            graph.nodes().take(rules.len()).filter_map(angle).filter(is_needed).collect();
+        let angles = angles(graph, &needed);
         Self {
             is_quadric: is_quadric(&rules, root),
             rules,

@@ -65,7 +65,8 @@ impl Cuts {
                 parts: [&choice.parts[..], &[(node, count, part)]].concat(),
                 ..Self::default()
             };
-            choices = choices.iter().flat_map(|choice| (0..count).map(move |part| with(choice, part))).collect();
+            choices =
+                choices.iter().flat_map(|choice| (0..count).map(move |part| with(choice, part))).collect();
         }
         choices
     }
@@ -176,7 +177,12 @@ fn unary(op: Unary, a: Growth, scales: Scales) -> Option<Growth> {
     }
 }
 
-fn binary(op: Binary, [a, b]: [Growth; 2], scales: Scales, (node, cuts): (usize, &mut Cuts)) -> Option<Growth> {
+fn binary(
+    op: Binary,
+    [a, b]: [Growth; 2],
+    scales: Scales,
+    (node, cuts): (usize, &mut Cuts),
+) -> Option<Growth> {
     match op {
         Binary::Add => Some(a.plus(b, scales)),
         Binary::Sub => Some(a.plus(b.negated(), scales)),
@@ -274,9 +280,8 @@ mod tests {
         let contractor = Contractor::new(&graph, root);
         let wanted = Wanted { region: Region::of(&Aabb::EMPTY), negated: false };
         let directions = Aabb::new(DVec3::new(1.0, -1.0, -1.0), DVec3::ONE);
-        let verdict = |from: f64, to: f64| {
-            contractor.far(&wanted, &Far { directions, scales: Scales { from, to } })
-        };
+        let verdict =
+            |from: f64, to: f64| contractor.far(&wanted, &Far { directions, scales: Scales { from, to } });
         // 10⁻³⁰⁰·x⁴ < 1 up to x = 10⁷⁵, but x¹⁰ is infinite from 10³¹ on
         assert_eq!(verdict(10.0, 90.0), Contracted::Nowhere);
         assert_eq!(verdict(10.0, 120.0), Contracted::Somewhere);

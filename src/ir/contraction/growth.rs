@@ -119,7 +119,7 @@ impl Growth {
             ends.iter().copied().fold(f64::NEG_INFINITY, f64::max),
         );
         let reaches = |size: f64, limit: f64| {
-            if !(size > 0.0) {
+            if size <= 0.0 {
                 f64::INFINITY
             } else if exponents(size)[0] >= limit || !size.is_finite() {
                 f64::NEG_INFINITY
@@ -186,7 +186,8 @@ impl Growth {
 
     /// A whole power, which is above zero.
     pub fn to_the(self, exponent: u32, scales: Scales) -> Self {
-        let factor = forward::power(self.factor, exponent).widened(ROUNDING.saturating_mul(exponent).min(999));
+        let factor =
+            forward::power(self.factor, exponent).widened(ROUNDING.saturating_mul(exponent).min(999));
         Self::with(self.degree * f64::from(exponent), factor, &[self], scales)
     }
 

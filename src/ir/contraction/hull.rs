@@ -10,6 +10,7 @@ use super::sets::{Contracted, part_of_angle, parts_of_angle};
 use crate::geom::Aabb;
 use crate::interval::Interval;
 use crate::ir::bounds::range::Region;
+use crate::ir::graph::Node;
 
 /// Choices of the parts of angles that are looked at.
 const MOST_CHOICES: u32 = 32;
@@ -44,23 +45,7 @@ impl Contractor {
             let choices: u32 = cuts.iter().map(|(_, parts)| parts).product();
             let (mut hull, mut filled) = (Aabb::EMPTY, 0);
             for choice in 0..choices {
-                scratch.known.clear();
-                let mut left = choice;
-                for &(cut, parts) in &cuts {
-                    let part = left % parts;
-                    left /= parts;
-                    let all = Interval::ALL;
-                    let half = if 2 * part < parts { Interval { hi: 0.0, ..all } } else { Interval { lo: 0.0, ..all } };
-                    scratch.known.push((cut.a, half));
-                    for (angle, &ranges) in self.angles.iter().zip(&ranges) {
-                        if angle.node == cut.node {
-                            scratch.known.push((angle.node, part_of_angle(ranges, (part, parts))));
-                        } else if angle.a == cut.a {
-                            scratch.known.push((angle.node, half));
-                        }
-                    }
-                }
-                scratch.known.sort_by_key(|(node, _)| node.index());
+                self.choose(&cuts, &ranges, choice, &mut scratch.known);
                 let mut own = before;
                 match self.pass(&region, wanted.negated, scratch) {
                     None => {}
@@ -68,11 +53,10 @@ impl Contractor {
                         filled += 1;
                         hull = hull.union(&own);
                     }
-                    Some(false) => {
-                        if self.read_box(&scratch.values, &mut own).is_some() {
-                            hull = hull.union(&own);
-                        }
+                    Some(false) if self.read_box(&scratch.values, &mut own).is_some() => {
+                        hull = hull.union(&own)
                     }
+                    Some(false) => {}
                 }
             }
             if filled == choices {
@@ -81,6 +65,36 @@ impl Contractor {
             *space = hull;
             if hull.is_empty() { Contracted::Nowhere } else { Contracted::Somewhere }
         })
+    }
+
+    /// What a choice of a part of each cut says of its angle and of the number whose sign the angle has.
+    fn choose(
+        &self,
+        cuts: &[(Angle, u32)],
+        ranges: &[[Interval; 2]],
+        mut choice: u32,
+        known: &mut Vec<(Node, Interval)>,
+    ) {
+        known.clear();
+        for &(cut, parts) in cuts {
+            let part = choice % parts;
+            choice /= parts;
+            let (mut half, is_below) = (Interval::ALL, 2 * part < parts);
+            if is_below {
+                half.hi = 0.0;
+            } else {
+                half.lo = 0.0;
+            }
+            known.push((cut.a, half));
+            for (angle, &ranges) in self.angles.iter().zip(ranges) {
+                if angle.node == cut.node {
+                    known.push((angle.node, part_of_angle(ranges, (part, parts))));
+                } else if angle.a == cut.a {
+                    known.push((angle.node, half));
+                }
+            }
+        }
+        known.sort_by_key(|(node, _)| node.index());
     }
 
     /// A few angles that jump in a box, at the zeros of different numbers, and the number of their parts.
@@ -144,7 +158,7 @@ impl Contractor {
 pub(super) mod tests {
     use super::super::linear::{contract_linear, contract_linear_around};
     use super::*;
-    use crate::ir::graph::{Axis, Graph, Node};
+    use crate::ir::graph::{Axis, Graph};
     use crate::ir::{Binary, Interpreter, Unary, UnaryFunction};
     use glam::DVec3;
     use proptest::prelude::*;

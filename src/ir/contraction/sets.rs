@@ -34,9 +34,10 @@ pub fn part_of_angle([a, b]: [Interval; 2], (part, count): (u32, u32)) -> Interv
         return Interval { lo: at(part), hi: at(part + 1) }.widened(8);
     }
     let farthest = |a: f64| if b.hi < 0.0 { libm::atan2(a.abs(), b.hi) * (1.0 - 1e-15) } else { 0.0 };
-    match part {
-        0 => Interval { hi: -farthest(a.lo.min(0.0)), ..all },
-        _ => Interval { lo: farthest(a.hi.max(0.0)), ..all },
+    if part == 0 {
+        Interval { hi: -farthest(a.lo.min(0.0)), ..all }
+    } else {
+        Interval { lo: farthest(a.hi.max(0.0)), ..all }
     }
 }
 

@@ -63,7 +63,9 @@ fn is_sum_of_squares(graph: &Graph, node: Node) -> bool {
             Expr::Binary(Binary::Mul, a, b) if graph.as_constant(a).is_some_and(|a| a >= 0.0) => {
                 waiting.push(b);
             }
-            Expr::Binary(Binary::Mul | Binary::Div, a, b) if graph.as_constant(b).is_some_and(|b| b > 0.0) => {
+            Expr::Binary(Binary::Mul | Binary::Div, a, b)
+                if graph.as_constant(b).is_some_and(|b| b > 0.0) =>
+            {
                 waiting.push(a);
             }
             Expr::Constant(bits) if f64::from_bits(bits) >= 0.0 => {}

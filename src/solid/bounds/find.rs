@@ -56,7 +56,9 @@ impl Solid {
     /// The bounds of the part of the solid in a box.
     pub(super) fn found_within(&self, around: Aabb) -> FoundBounds {
         let found = match self.parts_with_hulls() {
-            Some(parts) => self.with_common_angles(search(&Tree { words: parts.words.clone(), parts }, around)),
+            Some(parts) => {
+                self.with_common_angles(search(&Tree { words: parts.words.clone(), parts }, around))
+            }
             None => search(&WholeFormula::of(self, false), around),
         };
         let Some(Found { hull, is_tight }) = found else {

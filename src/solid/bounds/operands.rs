@@ -12,7 +12,9 @@ use super::search::EVERYWHERE;
 use super::whole::at_its_time;
 use crate::geom::Aabb;
 use crate::interval::Interval;
-use crate::ir::{Axis, Contractor, Expr, Framed, Graph, LinearForm, Node, Region, SignRule, Unary, contract_linear, framed};
+use crate::ir::{
+    Axis, Contractor, Expr, Framed, Graph, LinearForm, Node, Region, SignRule, Unary, contract_linear, framed,
+};
 use crate::solid::construction::Solid;
 use crate::solid::engine::Engine;
 
@@ -29,8 +31,13 @@ impl Solid {
     /// A box around the solid from its operands; `None` if none was found.
     pub(super) fn box_of_operands(&self) -> Option<Aabb> {
         let (graph, root) = at_its_time(self);
-        let mut operands =
-            Operands { solid: self, graph: graph.into_owned(), looks: MOST_LOOKS, known: FxHashMap::default() };
+        let mut operands = Operands {
+            solid: self,
+            graph: graph.into_owned(),
+            looks: MOST_LOOKS,
+            root,
+            known: FxHashMap::default(),
+        };
         operands.around(root, false)
     }
 
@@ -44,6 +51,8 @@ impl Solid {
 struct Operands<'a> {
     solid: &'a Solid,
     graph: Graph,
+    /// What was searched already.
+    root: Node,
     looks: usize,
     /// What was found of nodes, negated or not.
     known: FxHashMap<(Node, bool), Option<Aabb>>,
@@ -65,7 +74,13 @@ impl Operands<'_> {
             (SignRule::All(u, v), true) | (SignRule::Any(u, v), false) => {
                 let (first, second) = (self.around(u, negated)?, self.around(v, negated)?);
                 // the union with an empty box must not be made of its corners
-                Some(if first.is_empty() { second } else if second.is_empty() { first } else { first.union(&second) })
+                Some(if first.is_empty() {
+                    second
+                } else if second.is_empty() {
+                    first
+                } else {
+                    first.union(&second)
+                })
             }
             (SignRule::Leaf, _) => self.alone(node, negated),
         };
@@ -76,17 +91,21 @@ impl Operands<'_> {
     /// The box of a node from a search of its own, in the coordinates of space or in those of its forms.
     fn alone(&mut self, node: Node, negated: bool) -> Option<Aabb> {
         self.looks = self.looks.checked_sub(1)?;
+        let is_whole = node == self.root && !negated;
         let root = if negated { self.graph.unary(Unary::Neg, node) } else { node };
         let (graph, root) = self.graph.extract_cone(root);
         let part = self.solid.of_formula(&graph, root)?;
-        match part.found_within(EVERYWHERE).bounds {
-            Bounds::Empty => return Some(Aabb::EMPTY),
-            Bounds::Within(hull) => return Some(hull),
-            Bounds::Unbounded => {}
+        if is_whole {
+            return self.in_frame(&graph, root);
         }
-        part.box_far_out().or_else(|| self.in_frame(&graph, root))
+        match part.found_within(EVERYWHERE).bounds {
+            Bounds::Empty => Some(Aabb::EMPTY),
+            Bounds::Within(hull) => Some(hull),
+            Bounds::Unbounded => part.box_far_out().or_else(|| self.in_frame(&graph, root)),
+        }
     }
 
+    /// The box from a search in the coordinates of the forms.
     fn in_frame(&self, graph: &Graph, root: Node) -> Option<Aabb> {
         let Framed { graph: inner, root: inner_root, forms } = framed(graph, root)?;
         let part = self.solid.of_formula(&inner, inner_root)?;
@@ -98,7 +117,9 @@ impl Operands<'_> {
         let time = self.solid.moment.interval();
         let (mut space, mut known) = (EVERYWHERE, Vec::new());
         for (axis, &form) in forms.iter().enumerate() {
-            if let Some(own) = Axis::SPACE.into_iter().position(|axis| graph.expr(form) == Expr::Coordinate(axis)) {
+            if let Some(own) =
+                Axis::SPACE.into_iter().position(|axis| graph.expr(form) == Expr::Coordinate(axis))
+            {
                 (space.min[own], space.max[own]) = (within.min[axis], within.max[axis]);
                 continue;
             }
