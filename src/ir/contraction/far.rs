@@ -223,7 +223,7 @@ fn binary(
 mod tests {
     use super::super::hull::tests::formula;
     use super::*;
-    use crate::ir::Interpreter;
+    use crate::ir::{Graph, Interpreter, UnaryFunction};
     use glam::DVec3;
     use proptest::prelude::*;
 
@@ -264,13 +264,26 @@ mod tests {
         }
     }
 
+    /// (sinh z)^0.57 is no number for negative z, and infinite as soon as programs find −∞ for sinh z.
+    #[test]
+    fn powers_of_what_is_infinite_decide_nothing() {
+        let mut graph = Graph::default();
+        let (z, exponent) = (graph.coordinate(Axis::Z), graph.constant(0.57));
+        let sinh = graph.unary(UnaryFunction::Sinh.into(), z);
+        let root = graph.binary(BinaryFunction::Pow.into(), sinh, exponent);
+        let directions = Aabb::new(DVec3::NEG_Z, DVec3::NEG_Z);
+        let far = Far { directions, scales: Scales { from: 10.0, to: 100.0 } };
+        let wanted = Wanted { region: Region::of(&Aabb::EMPTY), negated: false };
+        assert_eq!(Contractor::new(&graph, root).far(&wanted, &far), Contracted::Somewhere);
+    }
+
     /// x·10⁻³⁰⁰·x¹⁰ overflows before it is larger than x⁶ − 1 where it stands: programs find the other sign there.
     #[test]
     fn a_product_that_overflows_early_decides_nothing() {
-        let mut graph = crate::ir::Graph::default();
+        let mut graph = Graph::default();
         let x = graph.coordinate(Axis::X);
         let small = graph.constant(1e-300);
-        let power = |graph: &mut crate::ir::Graph, exponent: u32| {
+        let power = |graph: &mut Graph, exponent: u32| {
             (1..exponent).fold(x, |product, _| graph.binary(Binary::Mul, product, x))
         };
         let tenth = power(&mut graph, 10);

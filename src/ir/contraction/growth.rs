@@ -193,6 +193,10 @@ impl Growth {
 
     /// The power of a number that is not negative; `None` if there is none.
     pub fn real_power(self, exponent: f64, scales: Scales) -> Option<Self> {
+        // (−∞)^0.1 is ∞
+        if self.factor.lo < 0.0 && self.may_fail(scales) {
+            return Some(Self::UNKNOWN);
+        }
         let base = meet(self.factor, POSITIVE)?;
         if exponent < 0.0 && (base.lo == 0.0 || self.may_fail(scales)) {
             return Some(Self::UNKNOWN);
