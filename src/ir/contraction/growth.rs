@@ -210,9 +210,19 @@ impl Growth {
     pub fn smaller(op: Binary, a: Self, b: Self, scales: Scales) -> Self {
         let (factors, degree) = Self::aligned(a, b, scales);
         let factor = forward::binary(op, factors[0], factors[1]).range.unwrap_or(Interval::ALL);
-        // an infinite operand is not always chosen
         let operands = [a, b];
-        let found = Self::with(degree, factor.widened(ROUNDING), &operands, scales);
+        let mut found = Self::with(degree, factor.widened(ROUNDING), &operands, scales);
+        if op == Binary::And {
+            // the squares of operands overflow and underflow earlier: the result is then off by a factor, or infinite
+            let Interval { lo, hi } = found.factor;
+            let smaller = factors[0].hi.min(factors[1].hi);
+            let (lo, hi) =
+                (if lo < 0.0 { 2.0 * lo } else { 0.5 * lo }, if hi > 0.0 { 2.0 * hi } else { 0.5 * hi });
+            found.factor = Interval { lo, hi: hi.max(smaller) };
+            if !Self::have_squares(factors, degree, scales) {
+                found.may_overflow = f64::NEG_INFINITY;
+            }
+        }
         // programs find the sign of what dwindles, too
         let (mut factor, least) = (found.factor, f64::MIN_POSITIVE);
         if operands.iter().any(|of| of.factor.hi < 0.0) {
@@ -220,7 +230,14 @@ impl Growth {
         } else if operands.iter().all(|of| of.factor.lo > 0.0) {
             factor = Interval { lo: factor.lo.max(least), hi: factor.hi.max(least) };
         }
+        // an infinite operand is not always chosen
         Self { factor, overflows: f64::INFINITY, ..found }
+    }
+
+    /// Whether the squares of two numbers, and their sum, are numbers in programs at all scales.
+    fn have_squares(factors: [Interval; 2], degree: f64, scales: Scales) -> bool {
+        let most = factors.into_iter().fold(0.0, |most: f64, a| most.max(a.lo.abs()).max(a.hi.abs()));
+        [scales.from, scales.to].iter().all(|l| (most.log2() + degree * l).abs() < 0.5 * LARGE)
     }
 
     /// An operation that has the same value where both operands are k times as large.
@@ -228,7 +245,10 @@ impl Growth {
         if a.may_fail(scales) || b.may_fail(scales) {
             return Self::UNKNOWN;
         }
-        let ([a, b], _) = Self::aligned(a, b, scales);
+        let ([a, b], degree) = Self::aligned(a, b, scales);
+        if matches!(op, Binary::AndWeight | Binary::OrWeight) && !Self::have_squares([a, b], degree, scales) {
+            return Self::UNKNOWN;
+        }
         Self::number(forward::binary(op, a, b).range.unwrap_or(Interval::ALL))
     }
 }
