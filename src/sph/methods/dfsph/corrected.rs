@@ -15,6 +15,10 @@
 //! Pressures act by the adjoint of the rate. So the system keeps its symmetry, pressure has no energy from a flow that it
 //! need not change, and momentum is conserved in pairs. A turning fluid has J:E = 0, so that angular momentum is, too.
 //!
+//! Equal pressures no longer push particles to where there are fewer of them, as they do in pairs. So particles drift there
+//! ([`shifting`](super::super::shifting)), without which they are in disorder and pressures noisy: the flow between two
+//! cylinders, five spacings wide, is off by 4.6 % without and 2.4 % with it, by 9.8 % with A = 1.
+//!
 //! Beside a wall with the normal n the one half of B that is missing is the wall's matter, and along n it belongs to
 //! M. So E is even along the wall alone: E = B but for the plane, where it is ½ tr, and for what joins n to the plane,
 //! where it is nothing.

@@ -485,7 +485,8 @@ impl DivergenceFree {
     /// at the new places from exceeding the rest density. The part `owed` of the density that the latter take
     /// away becomes a debt. The velocities are those in `drift`. Returns whether densities had to be kept.
     pub(super) fn find_displacements(&mut self, core: &Core, dt: f64, owed: f64) -> bool {
-        if let Some((crowding, factor)) = shift(self.numbers.shifting, &self.crowding, core) {
+        let shifting = self.numbers.shifting_in(core.parameters.fills_vessel);
+        if let Some((crowding, factor)) = shift(shifting, &self.crowding, core) {
             add_scaled(&mut self.drift, crowding, factor);
         }
         self.places.find_rate_of(core, &self.walls, &self.drift, RateOf::Velocity(&self.whole));
@@ -509,7 +510,7 @@ impl DivergenceFree {
                 *debt += owed * (excess.max(0.0) - left).max(0.0);
             }
         }
-        if let Some((crowding, factor)) = shift(self.numbers.shifting, &self.crowding, core) {
+        if let Some((crowding, factor)) = shift(shifting, &self.crowding, core) {
             add_scaled(&mut self.displacement, crowding, factor * dt);
         }
         !is_kept
