@@ -224,10 +224,17 @@ mod tests {
         {
             Method::from(asks_nothing).settle(&|| panic!("the answer would not matter"));
         }
-        for mut method in [Method::from(Dfsph::default()), Method::from(Paper::default())] {
+        let stated = Dfsph { shifting: Some(1.0), ..Dfsph::default() };
+        for mut method in [Method::from(stated), Method::from(Paper::default())] {
             let before = method;
             method.settle(&|| panic!("they do not ask"));
             assert_eq!(method, before);
+        }
+        // the drift of a fluid that fills its room is among the passes
+        for has_surface in [false, true] {
+            let mut method = Method::from(Dfsph::default());
+            method.settle(&|| has_surface);
+            assert!(matches!(method, Method::Dfsph(dfsph) if dfsph.fills_room != has_surface));
         }
     }
 
