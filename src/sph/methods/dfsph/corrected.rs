@@ -124,7 +124,8 @@ fn correction(moment: DMat3, even: DMat3) -> DMat3 {
     let trace = |m: &DMat3| m.x_axis.x + m.y_axis.y + m.z_axis.z;
     let [found, expected] = [&moment, &even].map(trace);
     let is_flat = !(found > 0.0 && moment.determinant() > FLAT * (found / 3.0).powi(3));
-    if is_flat || !(expected > LEAST_FREE) {
+    let is_free = expected > LEAST_FREE;
+    if is_flat || !is_free {
         return DMat3::IDENTITY;
     }
     found / expected * even * moment.inverse()
