@@ -7,7 +7,7 @@ use std::path::Path;
 use serde::Serialize;
 
 use super::failure::{Failure, note};
-use super::findings::{Message, message};
+use super::message::{Message, message};
 use super::shared::Shared;
 use crate::cli::output::{self, Shown};
 use rfm::Program;

@@ -27,6 +27,7 @@ mod lints;
 mod lsp;
 mod manual;
 mod mesh;
+mod message;
 mod output;
 mod params;
 mod plot;

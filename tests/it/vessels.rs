@@ -343,7 +343,8 @@ scene s {
 #[test]
 #[ignore = "long"]
 fn a_full_tank_bears_its_water() {
-    for push in [0.0, 2.0] {
+    // a pressure that pushes water along stirs it
+    for (push, load_within, speed_within) in [(0.0, 0.005, 0.02), (2.0, 0.02, 0.3)] {
         let experiment = experiment(&format!(
             "rfm 1
 solid tank = box([0, 0, 0], [0.4, 0.2, 0.3]).move([{push}/2*t^2, 0, 0])
@@ -373,8 +374,8 @@ scene full {{
         }
         println!("pushed with {push} m/s²: {:.2} N, {fastest:.4} m/s in the tank", sum / count);
         let known = DVec3::new(-24.0 * push, 0.0, -24.0 * 9.81);
-        assert!((sum / count - known).length() < 0.005 * known.length(), "{} for {known}", sum / count);
-        assert!(fastest < 0.1, "{fastest} m/s");
+        assert!((sum / count - known).length() < load_within * known.length(), "{} for {known}", sum / count);
+        assert!(fastest < speed_within, "{fastest} m/s");
         let Particles { position, pressure, .. } = simulation.particles();
         let middle = 0.2 + 0.5 * push * simulation.time().powi(2);
         for (at, pressure) in position.iter().zip(pressure).filter(|(at, _)| (at.x - middle).abs() < 0.05) {

@@ -10,7 +10,7 @@
 //! that leaves in B takes a shear for a compression, pressure opposes it, and has energy from it in proportion to its
 //! level, which is as high in a full vessel as its lowest pressure demands. So Taylor–Green vortices, 24 spacings wide,
 //! lost 45 % of their energy in the time in which they should lose 18 %, and 92 % where it should be 55; their lattice
-//! took much of that when it broke. With the gradients corrected (Bonet & Lok 1999) they lose 23 and 54 %.
+//! took much of that when it broke. With the gradients corrected (Bonet & Lok 1999) they lose 18 and 52 %.
 //!
 //! Pressures act by the adjoint of the rate. So the system keeps its symmetry, pressure has no energy from a flow that it
 //! need not change, and momentum is conserved in pairs. A turning fluid has J:E = 0, so that angular momentum is, too.
