@@ -132,15 +132,9 @@ impl Solid {
         contact.distance == 0.0 || contact.distance.is_nan() || !self.confirms(contact, p)
     }
 
-    /// The contact that parts of the formula gave for a point, or that of all of it where that is not confirmed. What is not
-    /// within `reach` does not matter.
-    pub(in crate::solid) fn confirmed(&self, found: Contact, p: DVec3, reach: f64) -> Contact {
-        if found.distance.abs() < reach && !self.confirms(&found, p) { self.contact(p) } else { found }
-    }
-
     /// Whether the surface lies about where an estimated contact says. That is asked only for formulas that may be so steep
     /// that an estimate is far too short: around the axis of an angle, on the crease of a root.
-    fn confirms(&self, contact: &Contact, p: DVec3) -> bool {
+    pub(in crate::solid) fn confirms(&self, contact: &Contact, p: DVec3) -> bool {
         if !self.may_be_steep() || contact.distance.abs() <= NEAR * p.abs().max_element() {
             return true;
         }

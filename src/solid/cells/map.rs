@@ -187,9 +187,11 @@ impl CellMap {
         sign.iter_mut().for_each(|s| *s = Unary::Sign.eval(*s));
     }
 
-    /// What a particle needs to know of the surface, if that is nearer than the reach; otherwise an infinite distance,
-    /// positive in the fluid and negative inside, without normal and curvature. It differs from [`Solid::contact`] in
-    /// that leaves without a zero within reach are left out: estimates of their distance may be too small.
+    /// What a particle needs to know of the surface, if that is nearer than the reach; otherwise an infinite
+    /// distance, positive in the fluid and negative inside, without normal and curvature.
+    ///
+    /// It differs from [`Solid::contact`] in that leaves without a zero within reach are left out: estimates
+    /// of their distance may be too small.
     #[inline]
     pub fn contact(&self, p: DVec3) -> Contact {
         let beyond =
@@ -198,7 +200,9 @@ impl CellMap {
             Some(Known::Fluid) => return beyond(1.0),
             Some(Known::Inside) => return beyond(-1.0),
             Some(Known::Near(words)) => {
-                self.solid.confirmed(self.nearest(words, &mut 0, p).contact(), p, self.reach)
+                let found = self.nearest(words, &mut 0, p).contact();
+                let is_near = found.distance.abs() < self.reach;
+                if is_near && !self.solid.confirms(&found, p) { self.solid.contact(p) } else { found }
             }
             _ => self.solid.contact(p),
         };
