@@ -57,7 +57,6 @@ pub(crate) use derived::hoisted::{Hoisted, Outside, Uniforms, hoisted};
 pub use derived::localised::localised;
 pub(crate) use derived::rigid::RigidMotion;
 pub(crate) use derived::sign::SignRule;
-pub(crate) use derived::steep::may_be_steep;
 pub(crate) use derived::twin::twin;
 pub use dump::dump;
 pub use form::{Form, Forms};

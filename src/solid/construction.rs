@@ -37,7 +37,6 @@ pub(super) struct Inner {
     contact: OnceLock<Programs>,
     velocity: OnceLock<Programs>,
     motion: OnceLock<Option<RigidMotion>>,
-    steep: OnceLock<bool>,
     parts: OnceLock<Option<LeavesAtAllTimes>>,
     /// ω with what encloses its parts, if anything does.
     with_hulls: Option<(Graph, Node)>,
@@ -140,7 +139,6 @@ impl Solid {
             contact: OnceLock::new(),
             velocity: OnceLock::new(),
             motion: OnceLock::new(),
-            steep: OnceLock::new(),
             parts: OnceLock::new(),
             with_hulls,
             parts_with_hulls: OnceLock::new(),
@@ -151,12 +149,6 @@ impl Solid {
             solid.inner.omega.value.require_machine_code()?;
         }
         Ok(solid)
-    }
-
-    /// Whether the slope of the formula may say nothing of the distance at some places, see `ir::steep`.
-    pub(super) fn may_be_steep(&self) -> bool {
-        let Function { graph, root, .. } = &self.inner.omega;
-        *self.inner.steep.get_or_init(|| ir::may_be_steep(graph, *root))
     }
 
     /// Whether time occurs in the formula.

@@ -30,12 +30,6 @@ pub struct Contact {
 /// Velocities along the normal of one face agree more than this (cosine).
 const SAME_FACE: f64 = 0.99;
 
-/// Contacts that are nearer than this, relative to the coordinates, are not looked into: numbers end there.
-const NEAR: f64 = 1e-9;
-
-/// The parts of the way to an estimated contact after which a point is on the other side, if the estimate is right.
-const BEYOND_SURFACE: [f64; 2] = [1.02, 1.5];
-
 impl Contact {
     /// The place of the surface that was found from a point `p`; the point itself where none was.
     pub fn foot(&self, p: DVec3) -> DVec3 {
@@ -120,44 +114,11 @@ impl Solid {
     /// The contact at a point. `distances` are prepared when a search is first needed.
     fn contact_or_search(&self, p: DVec3, distances: &OnceCell<Distances>) -> Contact {
         let contact = self.estimated_contact(p);
-        if self.is_lost(&contact, p) && self.sign(p).abs() == 1.0 {
-            self.searched_contact(distances.get_or_init(|| Distances::new(self)), p, contact)
+        let is_lost = contact.distance == 0.0 || contact.distance.is_nan();
+        if is_lost && self.sign(p).abs() == 1.0 {
+            searched_contact(distances.get_or_init(|| Distances::new(self)), p, contact)
         } else {
             contact
-        }
-    }
-
-    /// Whether an estimated contact is none: the derivatives say nothing, or what they say is not confirmed.
-    fn is_lost(&self, contact: &Contact, p: DVec3) -> bool {
-        contact.distance == 0.0 || contact.distance.is_nan() || !self.confirms(contact, p)
-    }
-
-    /// Whether the surface lies about where an estimated contact says. That is asked only for formulas that may be so steep
-    /// that an estimate is far too short: around the axis of an angle, on the crease of a root.
-    pub(in crate::solid) fn confirms(&self, contact: &Contact, p: DVec3) -> bool {
-        if !self.may_be_steep() || contact.distance.abs() <= NEAR * p.abs().max_element() {
-            return true;
-        }
-        let sign = self.sign(p);
-        let is_other = |part: f64| self.sign(p - part * contact.distance * contact.normal) != sign;
-        BEYOND_SURFACE.into_iter().any(is_other)
-    }
-
-    /// The contact with the nearest point of the surface. Its curvature is that of the face there; at an edge nothing is
-    /// known of it. Where no surface is found it is infinitely far, and the rest stays that of `lost`.
-    fn searched_contact(&self, distances: &Distances, p: DVec3, lost: Contact) -> Contact {
-        let Distance { estimate, nearest, .. } = distances.at(p);
-        let normal = (p - nearest) / estimate;
-        match normal.is_finite() {
-            true => {
-                let face = self.estimated_contact(nearest);
-                // a face that is seen from the point along its normal
-                let is_smooth = face.normal.dot(normal) >= SAME_FACE && face.mean_curvature.is_finite();
-                let mean_curvature = if is_smooth { face.mean_curvature } else { 0.0 };
-                Contact { distance: estimate, normal, mean_curvature }
-            }
-            false if estimate.is_infinite() => Contact { distance: estimate, ..lost },
-            false => lost,
         }
     }
 
@@ -209,10 +170,9 @@ impl Solid {
         self.evaluate_many(ProgramKind::Contact, points, [distance, nx, ny, nz, curvature]);
         let distances = OnceCell::new();
         for i in 0..distance.len() {
-            let p = DVec3::from_array(points.map(|column| column[i].to_f64()));
-            let normal = DVec3::from_array([nx[i], ny[i], nz[i]].map(T::to_f64));
-            let (distance_found, mean_curvature) = (distance[i].to_f64(), curvature[i].to_f64());
-            if self.is_lost(&Contact { distance: distance_found, normal, mean_curvature }, p) {
+            let found = distance[i].to_f64();
+            if found == 0.0 || found.is_nan() {
+                let p = DVec3::from_array(points.map(|column| column[i].to_f64()));
                 let Contact { distance: d, normal, mean_curvature } = self.contact_or_search(p, &distances);
                 let row = [d, normal.x, normal.y, normal.z, mean_curvature].map(T::from_f64);
                 [distance[i], nx[i], ny[i], nz[i], curvature[i]] = row;
@@ -242,6 +202,18 @@ impl Solid {
     /// points at which ω is NaN because of their coordinates: not finite, or so large that their sum is not.
     pub fn range(&self, over: &Aabb) -> Interval {
         self.inner.omega.range(self.inner.engine, over, &self.moment, false)
+    }
+}
+
+/// The contact with the nearest point of the surface, of whose curvature nothing is known. Where no surface is found it
+/// is infinitely far, and the rest stays that of `lost`.
+fn searched_contact(distances: &Distances, p: DVec3, lost: Contact) -> Contact {
+    let Distance { estimate, nearest, .. } = distances.at(p);
+    let normal = (p - nearest) / estimate;
+    match normal.is_finite() {
+        true => Contact { distance: estimate, normal, mean_curvature: 0.0 },
+        false if estimate.is_infinite() => Contact { distance: estimate, ..lost },
+        false => lost,
     }
 }
 

@@ -76,9 +76,6 @@ const MOST_CELLS: usize = 1_000;
 /// Work for one point, in the unit of `bounds::search`.
 const MOST_WORK: usize = 100_000;
 
-/// Walks over what is left of a formula in a cell that take as long as to make the cell smaller.
-const WALKS_OF_CELL: usize = 4;
-
 /// Operations of machine code that take as long as a node of a formula whose range is found.
 const OPERATIONS_OF_NODE: usize = 16;
 
@@ -200,7 +197,6 @@ impl Distances {
             point: DVec3::NAN,
             work_of_sign: self.work_of_sign,
             work: Cell::new(MOST_WORK),
-            spent_around_cells: 0,
             fineness: COARSE,
         };
         self.rays(&mut best);
@@ -236,17 +232,7 @@ impl Distances {
             cells += 1;
             best.spend(target.work(&known));
             let before = best.distance;
-            let work = (target.work(&known) / WALKS_OF_CELL).max(1);
-            let is_cheap = work < best.work_of_sign;
-            let seems_other = |best: &Best<'_>, q: DVec3| {
-                if !is_cheap {
-                    return true;
-                }
-                best.spend(work);
-                let known = target.shrink(&known, &mut Aabb::new(q, q), Effort::Point);
-                known.is_some_and(|known| S::is_inside(&known))
-            };
-            best.try_cell(&space, seems_other);
+            best.try_cell(&space);
             if best.distance < before * (1.0 - GAP) {
                 best.turn();
             }
@@ -331,8 +317,6 @@ struct Best<'a> {
     work_of_sign: usize,
     /// What may still be spent on the point.
     work: Cell<usize>,
-    /// What was spent on places beside cells.
-    spent_around_cells: usize,
     /// The part of their lengths to which rays are halved.
     fineness: f64,
 }
@@ -360,35 +344,21 @@ impl Best<'_> {
     }
 
     /// Tries the middle of a cell, its corner that is nearest to the point, other corners, and what lies
-    /// behind the cell. What is known in the cell may show at less cost whether a point of it is on the other side.
-    fn try_cell(&mut self, cell: &Aabb, seems_other: impl Fn(&Self, DVec3) -> bool) {
+    /// behind the cell.
+    fn try_cell(&mut self, cell: &Aabb) {
         let nearest = self.p.clamp(cell.min, cell.max);
         if self.is_other(nearest) {
             self.take(nearest);
             return;
         }
         let centre = cell.centre();
-        let length = (centre - self.p).length();
-        // an edge may cut off less of the cell than its middle
-        let corners = if self.distance > WIDE_GAP * length { &cell.corners()[..] } else { &[] };
-        for place in [centre].iter().chain(corners) {
-            if seems_other(self, *place) {
-                self.try_ray(*place);
-            }
-        }
-        // formulas of which a sign takes long would leave nothing for other cells
-        let before = self.work.get();
-        if 2 * self.spent_around_cells > MOST_WORK.saturating_sub(before) {
-            return;
-        }
+        self.try_ray(centre);
         self.try_ray(centre + (centre - nearest));
-        self.try_around(cell, length);
-        self.spent_around_cells += before - self.work.get();
-    }
-
-    /// Tries what lies behind a cell, and the way from its middle to the other side.
-    fn try_around(&mut self, cell: &Aabb, length: f64) {
-        let centre = cell.centre();
+        // an edge may cut off less of the cell than its middle
+        let length = (centre - self.p).length();
+        if self.distance > WIDE_GAP * length {
+            cell.corners().into_iter().for_each(|corner| self.try_ray(corner));
+        }
         let behind = self.distance - length;
         if behind.is_finite() && behind > 0.0 && length > 0.0 {
             let direction = (centre - self.p) / length;

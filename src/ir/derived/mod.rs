@@ -8,5 +8,4 @@ pub mod hoisted;
 pub mod localised;
 pub mod rigid;
 pub mod sign;
-pub mod steep;
 pub mod twin;

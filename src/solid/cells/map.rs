@@ -199,11 +199,7 @@ impl CellMap {
         let found = match self.cells.find(p).map(|found| found.cell) {
             Some(Known::Fluid) => return beyond(1.0),
             Some(Known::Inside) => return beyond(-1.0),
-            Some(Known::Near(words)) => {
-                let found = self.nearest(words, &mut 0, p).contact();
-                let is_near = found.distance.abs() < self.reach;
-                if is_near && !self.solid.confirms(&found, p) { self.solid.contact(p) } else { found }
-            }
+            Some(Known::Near(words)) => self.nearest(words, &mut 0, p).contact(),
             _ => self.solid.contact(p),
         };
         if found.distance.abs() >= self.reach { beyond(found.distance.signum()) } else { found }
