@@ -3,8 +3,7 @@
 use super::super::foreign;
 use super::super::words::{ITEM_WORDS, KEYWORDS};
 use super::Slip;
-use super::pieces::{bracketed, fits, last_number, last_word, parts, unclosed};
-use super::ranges::replaced;
+use super::pieces::{bracketed, fits, last_number, last_word, parts, replaced, unclosed};
 use crate::diagnostic::{Code, Diagnostic, Span};
 
 /// What begins a fold.

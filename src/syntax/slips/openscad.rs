@@ -5,8 +5,10 @@ use super::super::foreign;
 use super::super::words::KEYWORDS;
 use super::Slip;
 use super::heads::FOLDS;
-use super::pieces::{bracketed, closing, first_part, fits, last_word, opening, parts, token_end, unclosed};
-use super::ranges::{multiple, replaced};
+use super::pieces::{
+    bracketed, closing, first_part, fits, last_word, opening, parts, replaced, token_end, unclosed,
+};
+use super::ranges::multiple;
 use crate::diagnostic::Diagnostic;
 
 impl Slip<'_> {

@@ -3,7 +3,7 @@
 use super::super::foreign;
 use super::Slip;
 use super::heads::FOLDS;
-use super::pieces::{bracketed, first_part, fits, last_open, last_part, last_word, parts, words};
+use super::pieces::{bracketed, first_part, fits, last_open, last_part, last_word, parts, replaced, words};
 use crate::diagnostic::Diagnostic;
 
 impl Slip<'_> {
@@ -326,32 +326,6 @@ pub(super) fn multiple(start: &str, step: &str, variable: &str) -> String {
         (true, _) => format!("-{product}"),
         (false, _) => format!("{start} {sign} {product}"),
     }
-}
-
-/// A formula with a value in place of a name: in brackets, unless it stands alone between commas or brackets. The
-/// name of an argument stays.
-pub(super) fn replaced(formula: &str, name: &str, value: &str) -> String {
-    let is_part = |c: char| c.is_alphanumeric() || c == '_';
-    let mut written = String::new();
-    let mut rest = formula;
-    while let Some(at) = rest.find(name) {
-        let (before, behind) = (&rest[..at], &rest[at + name.len()..]);
-        written += before;
-        let next = behind.trim_start();
-        let names_an_argument = next.starts_with('=') && !next.starts_with("==");
-        let is_name = !written.ends_with(|c: char| is_part(c) || c == '.')
-            && !behind.starts_with(is_part)
-            && !names_an_argument;
-        let is_alone = |text: &str| text.is_empty() || text.ends_with(['(', '[', ',']);
-        let ends = next.is_empty() || next.starts_with([')', ']', ',']);
-        match (is_name, is_alone(written.trim_end()) && ends) {
-            (false, _) => written += name,
-            (true, true) => written += value,
-            (true, false) => written += &format!("({value})"),
-        }
-        rest = behind;
-    }
-    written + rest
 }
 
 /// The members of a fold as they are written here: `0..5` and `[1, 2]` stay, and `range(5)` is `0..5`.
