@@ -59,7 +59,7 @@ pub struct Dfsph {
     /// speed. Default 0.06; zero: the term is not computed.
     pub artificial_viscosity: f64,
     /// Strength of the drift of particles to where there are fewer of them. Default 0.3 in a fluid that fills its
-    /// vessel, whose corrected sums make no order ([`corrected`]), else 0: no drift. In a fluid with a surface a strength of
+    /// vessel, whose corrected sums make no order, else 0: no drift. In a fluid with a surface a strength of
     /// 1 halves the deviation at rest, and makes that of a shear flow two to three times as large. In a full vessel
     /// strengths from 0.6 on overshoot.
     pub shifting: Option<f64>,
