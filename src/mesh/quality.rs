@@ -164,7 +164,7 @@ impl<'a> Reference<'a> {
         Ok(Self { distance, points, extent: (limit(coarser.0, finer.0), limit(coarser.1, finer.1)) })
     }
 
-    /// The distance of the point of the surface that is farthest from a mesh, in metres: no more than
+    /// The distance from a mesh of the farthest one of some points of the surface, in metres: no more than
     /// [`Quality::hausdorff`], and found in a small part of the time. For a mesh without triangles it is 0.
     pub fn least_distance(&self, mesh: &Mesh) -> f64 {
         let some: Vec<DVec3> = self.points.iter().step_by(PER_SAMPLE).copied().collect();

@@ -49,13 +49,16 @@ const OF_SCALE: f64 = 1e-11;
 const ROUNDING: u32 = 4;
 
 impl Scales {
-    /// s to the power of a degree.
+    /// s to the power of a degree. What is below or above all numbers has an end that is none: as 0 it would let another
+    /// operand decide a sign.
     fn power(self, degree: f64) -> Interval {
         if degree == 0.0 {
             return Interval::point(1.0);
         }
         let (a, b) = ((degree * self.from).exp2(), (degree * self.to).exp2());
-        Interval { lo: a.min(b) * (1.0 - OF_SCALE), hi: a.max(b) * (1.0 + OF_SCALE) }
+        let (lo, hi) = (a.min(b) * (1.0 - OF_SCALE), a.max(b) * (1.0 + OF_SCALE));
+        let lo = if lo < f64::MIN_POSITIVE { 0.0 } else { lo.min(f64::MAX) };
+        Interval { lo, hi: hi.max(f64::MIN_POSITIVE) }
     }
 }
 
@@ -250,5 +253,22 @@ impl Growth {
             return Self::UNKNOWN;
         }
         Self::number(forward::binary(op, a, b).range.unwrap_or(Interval::ALL))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::Scales;
+
+    /// With a power that is exactly zero 10⁴⁰ − (x/1000)¹⁰⁰ would end at 2048, where it is still positive.
+    #[test]
+    fn powers_beyond_all_numbers_keep_their_sign() {
+        let scales = Scales { from: 11.0, to: 12.0 };
+        let small = scales.power(-100.0);
+        assert!(small.lo == 0.0 && small.hi > 0.0, "{small:?}");
+        let large = scales.power(100.0);
+        assert!(large.lo.is_finite() && large.hi == f64::INFINITY, "{large:?}");
+        let usual = scales.power(2.0);
+        assert!(usual.lo < 2_f64.powi(22) && usual.hi > 2_f64.powi(24) && usual.hi < 1.001 * 2_f64.powi(24));
     }
 }

@@ -23,7 +23,7 @@
 //! the pressure pays it back within τ (Baumgarte 1972). The tolerance of this solve is that of the density
 //! over τ. A part of the density that displacements take away is added to the debt, see [`OWED`]. Velocities that
 //! displacements undo are taken away, see [`Arrest`]. Where the fluid fills its vessel, the sums of forces are exact for
-//! flows that are linear in space, see [`corrected`](super::corrected).
+//! flows that are linear in space, see [`corrected`](super::corrected), and neither is done.
 //!
 //! Both systems count the part of the kernel that is missing before a free surface as fluid
 //! ([`free_surface`](super::super::free_surface)), so that the outermost particles keep the same distance as

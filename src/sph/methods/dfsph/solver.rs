@@ -34,7 +34,7 @@ pub(super) struct Solver {
     correction: Option<Correction>,
     /// The answer s: p/ρ² where it changes velocities.
     pub s: Vec<f64>,
-    /// The diagonal of the system: the decrease of the particle's own dρ/dt in a second by a unit of s.
+    /// The diagonal of the system, without corrections: the decrease of the particle's own dρ/dt in a second by a unit of s.
     pub factor: Vec<f64>,
     /// a(s), the acceleration or displacement that belongs to the answer.
     pub push: Vectors,
