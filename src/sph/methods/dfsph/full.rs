@@ -7,8 +7,9 @@
 //! pressure can take away, and a uniform one would grow without end. (If nothing is compressed at all, without that,
 //! a flow between two cylinders bursts. If gaps up to a quantile of the densities are left, it is rougher by a sixth.)
 
-/// Part of a deviation from the mean density that is taken back within the relaxation time. Without it a rod that
-/// shakes makes half as much noise again; with all of it a vessel of turning water is off by a fifth more.
+/// Part of a deviation from the mean density that is taken back within the relaxation time. Without it water at rest in a
+/// full tank is exactly still, but the load of one that is pushed is 4 % too large instead of 2, and vortices are off by 8.0 %
+/// instead of 7.3.
 const EVENED: f64 = 0.5;
 
 /// Finds the rates of density, kg/m³/s, that pressure has to take away, from those of the velocities, the densities,
