@@ -67,38 +67,43 @@ pub(super) struct Hydrostatic {
     bodies: (Vec<usize>, usize),
     /// Of each particle, Pa; zero half a spacing above the highest particle of the body of fluid that it belongs to.
     pub pressure: Vec<f64>,
+    /// The gravity that each particle feels, m/s².
+    gravity: Vectors,
 }
 
 impl Hydrostatic {
-    /// The pressure under a uniform gravity, m/s², in bodies of fluid: the body of each particle, and their number.
-    pub fn of(core: &Core, bodies: (Vec<usize>, usize), g: DVec3) -> Self {
+    /// The pressure under a gravity, m/s², that is the same within each of the bodies of fluid: the body of each particle,
+    /// and their number.
+    pub fn of(core: &Core, bodies: (Vec<usize>, usize), g: impl Fn(usize) -> DVec3) -> Self {
         let parameters = &core.parameters;
         let (of, count) = &bodies;
         let position = &core.particles.position;
+        let mut gravity = Vectors::default();
+        (0..position.len()).for_each(|i| gravity.push(g(i)));
         let mut least = vec![f64::INFINITY; *count];
-        for (x, body) in position.iter().zip(of) {
+        for ((x, g), body) in position.iter().zip(gravity.iter()).zip(of) {
             least[*body] = least[*body].min(g.dot(x));
         }
-        let above = 0.5 * parameters.spacing() * g.length();
-        let at = |(x, body): (DVec3, &usize)| parameters.rest_density * (g.dot(x) - least[*body] + above);
-        let pressure = position.iter().zip(of).map(at).collect();
-        Self { pressure, bodies }
+        let pressure = position.iter().zip(gravity.iter()).zip(of).map(|((x, g), body)| {
+            parameters.rest_density * (g.dot(x) - least[*body] + 0.5 * parameters.spacing() * g.length())
+        });
+        let pressure = pressure.collect();
+        Self { pressure, gravity, bodies }
     }
 
-    /// The pressure of all of the fluid as one body.
+    /// The pressure of all of the fluid as one body, under a uniform gravity, m/s².
     pub fn of_one_body(core: &Core, g: DVec3) -> Self {
-        Self::of(core, (vec![0; core.particles.len()], 1), g)
+        Self::of(core, (vec![0; core.particles.len()], 1), |_| g)
     }
 
-    /// That of the same bodies under another gravity.
-    pub fn under(&self, core: &Core, g: DVec3) -> Self {
-        Self::of(core, self.bodies.clone(), g)
+    /// That of the same bodies under a gravity that differs by `change`, m/s².
+    pub fn after(&self, core: &Core, change: DVec3) -> Self {
+        Self::of(core, self.bodies.clone(), |i| self.gravity.get(i) + change)
     }
 
     /// Notes what walls bear of the fluid's weight.
     pub fn note_walls(&self, core: &Core, (forces, walls): (&mut Solver, &Walls), reaction: Reaction<'_>) {
         let rest = core.parameters.rest_density;
-        let against = -core.parameters.gravity;
         let s: Vec<f64> = self.pressure.iter().map(|p| p / (rest * rest)).collect();
         let mut push = Vectors::default();
         push.resize(s.len());
@@ -106,9 +111,9 @@ impl Hydrostatic {
         let mut is_free = vec![true; s.len()];
         walls.found().iter().for_each(|(i, _)| is_free[*i as usize] = false);
         let (mut found, mut number) = (0.0, 0.0);
-        for (push, _) in push.iter().zip(&is_free).filter(|(_, is_free)| **is_free) {
-            found += push.dot(against);
-            number += against.length_squared();
+        for ((push, g), _) in push.iter().zip(self.gravity.iter()).zip(&is_free).filter(|(_, free)| **free) {
+            found += push.dot(-g);
+            number += g.length_squared();
         }
         let found = if number > 0.0 { (found / number).max(LEAST_FOUND) } else { 1.0 };
         walls.found().par_iter().with_min_len(CHUNK / 4).for_each(|(i, (wall, completion))| {
@@ -116,7 +121,7 @@ impl Hydrostatic {
             let factor = -2.0 * rest * s[i];
             let of_pairs = (completion.inverse() * push.get(i) - factor * wall.gradient) / found;
             let pushed = Pushed {
-                by_pressure: against - of_pairs,
+                by_pressure: -self.gravity.get(i) - of_pairs,
                 factor: factor / found,
                 gradient: wall.gradient,
                 ..Pushed::default()

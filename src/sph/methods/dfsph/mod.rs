@@ -2,6 +2,7 @@
 
 mod ahead;
 mod arrest;
+mod carried;
 mod corrected;
 mod full;
 mod hydrostatic;

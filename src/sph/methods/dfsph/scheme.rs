@@ -86,6 +86,7 @@ use super::super::{
 };
 use super::ahead::Ahead;
 use super::arrest::Arrest;
+use super::carried::Carried;
 use super::hydrostatic::{self, Hydrostatic};
 use super::passes::{Constants, Continuation, Densities, Drag};
 use super::rigid::Rigid;
@@ -149,6 +150,8 @@ pub struct DivergenceFree {
     pub(super) own_pressure: Vec<f64>,
     /// What the last step gave of pressure in advance.
     ahead: Ahead,
+    /// The acceleration of the fluid in a sealed vessel as a whole.
+    carried: Carried,
     arrest: Arrest,
     /// Stiffness of a lattice of these particles, see [`Wendland::lattice_stiffness`].
     stiffness: f64,
@@ -211,11 +214,14 @@ impl Scheme for DivergenceFree {
         }
         core.move_obstacles(dt);
         core.drift(dt, Some((&self.displacement, 1.0 / dt)))?;
+        self.carried.act(core, 0.5 * dt);
+        self.carried.expect(&self.ahead.push);
         self.settle(core, &mut []);
         self.last_dt = dt;
         core.check_finite(dt)?;
         if hydrostatic::has_opened(core) {
             (core.parameters.is_sealed, core.parameters.fills_vessel) = (false, false);
+            self.carried.end();
         }
         Ok(dt)
     }
@@ -226,6 +232,7 @@ impl Scheme for DivergenceFree {
         checkpoint.set("debt", self.debt.clone());
         checkpoint.set("own pressure", self.own_pressure.clone());
         self.ahead.save(checkpoint);
+        self.carried.save(checkpoint);
         checkpoint.set("stiffness", vec![self.forces.stiffness, self.places.stiffness]);
         checkpoint.set(LAST_STEP, vec![self.last_dt]);
         save_crowding(&self.crowding, checkpoint);
@@ -237,6 +244,7 @@ impl Scheme for DivergenceFree {
         self.debt = checkpoint.of_particles("debt")?;
         self.own_pressure = checkpoint.of_particles("own pressure")?;
         self.ahead.restore(checkpoint)?;
+        self.carried.restore(checkpoint)?;
         if let [forces, places] = checkpoint.get("stiffness")? {
             (self.forces.stiffness, self.places.stiffness) = (*forces, *places);
         }
@@ -264,6 +272,7 @@ impl Scheme for DivergenceFree {
             + self.roughness.bytes()
             + self.walls.bytes()
             + self.ahead.bytes()
+            + self.carried.bytes()
             + self.arrest.bytes()
     }
 
@@ -295,6 +304,7 @@ impl DivergenceFree {
             debt: vec![0.0; n],
             own_pressure: vec![0.0; n],
             ahead: Ahead::nothing(n),
+            carried: Carried::at_rest(core),
             arrest: Arrest::default(),
             stiffness: 0.0,
             spread: vec![0.0; n],
@@ -345,6 +355,7 @@ impl DivergenceFree {
         let mut columns: SmallVec<[&mut Vec<f64>; 8]> =
             smallvec![&mut self.forces.s, &mut self.debt, &mut self.own_pressure, &mut self.ahead.s];
         columns.extend(self.roughness.columns());
+        columns.extend(self.carried.columns());
         columns.extend(kept.iter_mut().map(|column| &mut **column));
         core.sort(&mut columns);
         core.find_near();
@@ -433,13 +444,10 @@ impl DivergenceFree {
         // the compression without pressure; each iteration finds how much of it s takes away
         self.forces.find_rate_of(core, &self.walls, &core.particles.velocity, RateOf::Velocity(&self.whole));
         let found = (&self.forces.rate[..], &self.loaded[..], &self.debt[..]);
-        let mut carried = None;
-        if core.parameters.fills_vessel {
-            // particles that have a wall of a spacing between them belong to two bodies
-            let bodies = bodies(core, core.parameters.spacing());
-            let is_sealed = core.parameters.is_sealed;
-            carried = is_sealed.then(|| Hydrostatic::of(core, bodies.clone(), core.parameters.gravity));
-            full::find_unwanted(&mut self.free, &bodies, found, relaxation);
+        // particles that have a wall of a spacing between them belong to two bodies
+        let bodies = core.parameters.fills_vessel.then(|| bodies(core, core.parameters.spacing()));
+        if let Some(bodies) = &bodies {
+            full::find_unwanted(&mut self.free, bodies, found, relaxation);
         } else {
             let (rates, densities, debts) = found;
             let unwanted = |((rate, rho), debt): ((&f64, &f64), &f64)| {
@@ -459,9 +467,13 @@ impl DivergenceFree {
             goal.most_iterations = goal.most_iterations.saturating_mul(FIRST_ITERATIONS);
         }
         self.iterations = self.forces.solve(core, &self.walls, &self.free, dt, goal, Begin::Last);
+        let hydrostatic = bodies.filter(|_| core.parameters.is_sealed).map(|bodies| {
+            self.carried.learn(bodies.clone(), &self.forces.push, (self.last_dt, dt), std::env::var("SH").map_or(pressure::mean_share(core, dt, relaxation), |s| s.parse().unwrap()));
+            Hydrostatic::of(core, bodies, |i| core.parameters.gravity - self.carried.of(i))
+        });
         if let Some(reaction) = Reaction::of(core, dt) {
             self.forces.note_walls(reaction, &self.walls, rest, (&self.forces.push, &self.forces.s));
-            if let Some(hydrostatic) = &carried {
+            if let Some(hydrostatic) = &hydrostatic {
                 hydrostatic.note_walls(core, (&mut self.forces, &self.walls), reaction);
             }
         }
@@ -478,7 +490,8 @@ impl DivergenceFree {
             self.ahead.give(core, (&mut self.forces, &self.walls), dt);
         }
         add_scaled(&mut core.acceleration, &self.ahead.push, 0.5);
-        self.report_pressure(core, dt, relaxation, carried.as_ref());
+        self.report_pressure(core, dt, relaxation, hydrostatic.as_ref());
+        self.carried.act(core, 0.5 * dt);
     }
 
     /// Finds the displacements of a step of the length dt: those by shifting, and those that keep densities

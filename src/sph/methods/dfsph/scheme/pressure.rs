@@ -85,7 +85,7 @@ impl DivergenceFree {
     fn follow_the_weight(&self, core: &mut Core, hydrostatic: Option<&Hydrostatic>) {
         let Some([before, now]) = core.change_of_gravity(self.last_dt) else { return };
         if let Some(carried) = hydrostatic {
-            let earlier = carried.under(core, before);
+            let earlier = carried.after(core, before - now);
             let changes = carried.pressure.iter().zip(&earlier.pressure);
             let means = core.particles.pressure.iter_mut();
             means.zip(changes).for_each(|(mean, (now, before))| *mean += now - before);
@@ -102,6 +102,6 @@ impl DivergenceFree {
 
 /// The weight of a step's pressure in a mean over the relaxation time. Until that has passed, the mean is taken since
 /// the start.
-fn mean_share(core: &Core, dt: f64, relaxation: f64) -> f64 {
+pub(super) fn mean_share(core: &Core, dt: f64, relaxation: f64) -> f64 {
     (dt / relaxation.min(core.time + dt)).min(1.0)
 }
