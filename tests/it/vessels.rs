@@ -343,8 +343,8 @@ scene s {
 #[test]
 #[ignore = "long"]
 fn a_full_tank_bears_its_water() {
-    // a pressure that pushes water along stirs it
-    for (push, load_within, speed_within) in [(0.0, 0.005, 0.02), (2.0, 0.02, 0.3)] {
+    // at rest nothing moves; where the water is pressed together as it begins to be pushed, it is stirred
+    for (push, load_within, speed_within) in [(0.0, 0.001, 1e-6), (2.0, 0.005, 0.06)] {
         let experiment = experiment(&format!(
             "rfm 1
 solid tank = box([0, 0, 0], [0.4, 0.2, 0.3]).move([{push}/2*t^2, 0, 0])
@@ -382,7 +382,7 @@ scene full {{
             // the push presses the water together from its front face, where it presses on nothing
             let known = 9810.0 * (0.3 - at.z) + 1000.0 * push * (middle + 0.2 - at.x);
             // packing moves the highest particle, half a spacing above which the pressure is zero
-            assert!((pressure - known).abs() < 150.0, "{pressure} Pa at {at}, {known}");
+            assert!((pressure - known).abs() < 100.0, "{pressure} Pa at {at}, {known}");
         }
     }
 }

@@ -7,9 +7,10 @@
 //! pressure −ρ₀·ā·x is added as the hydrostatic one is ([`hydrostatic`](super::hydrostatic)): both are the pressure
 //! under the gravity g − ā that the vessel feels. The solver finds what is left.
 //!
-//! ā is what pressure gave the body in the last step. As the solver's pressure in advance ([`ahead`](super::ahead)), it
+//! ā is learnt from what pressure gives each body, as a mean over the relaxation time: what the mean velocity of the fluid
+//! changes by in a step is noisy. As the solver's pressure in advance ([`ahead`](super::ahead)), it
 //! acts for half of the step before and half of the step after the places where it is found. If it changes, the solver
-//! gives the difference, and from then on ā does.
+//! gives the difference until ā does.
 
 use glam::DVec3;
 
@@ -62,8 +63,14 @@ impl Carried {
 
     /// Learns what pressure has given each body in the mean since the last step: ā, half of the pressure in advance, and
     /// the accelerations `push`, m/s², of the solve of this step, of the length `dt`, s. The last one took `last_dt`, s; a
-    /// short step, as before a frame, makes little of the noise of its pressure.
-    pub fn learn(&mut self, bodies: (Vec<usize>, usize), push: &Vectors, (last_dt, dt): (f64, f64), share: f64) {
+    /// short step, as before a frame, makes little of the noise of its pressure. Of what is new the part `share` is learnt.
+    pub fn learn(
+        &mut self,
+        bodies: (Vec<usize>, usize),
+        push: &Vectors,
+        (last_dt, dt): (f64, f64),
+        share: f64,
+    ) {
         self.bodies = bodies;
         self.share = share;
         if last_dt > 0.0 {
@@ -136,14 +143,16 @@ mod tests {
         [1.0, 9.0, 3.0].into_iter().for_each(|x| push.push(DVec3::new(x, 0.0, 0.0)));
         let two = (vec![0, 1, 0], 2);
         // half of the last step in advance, and all of this one
-        carried.learn(two.clone(), &push, (0.0, 0.1));
+        carried.learn(two.clone(), &push, (0.0, 0.1), 1.0);
         carried.expect(&push);
-        carried.learn(two.clone(), &push, (0.1, 0.1));
+        carried.learn(two.clone(), &push, (0.1, 0.1), 1.0);
         let found: Vec<f64> = (0..3).map(|i| carried.of(i).x).collect();
         assert!((found[0] - 3.0).abs() < 1e-12 && found[2] == found[0], "{found:?}");
         assert!((found[1] - 13.5).abs() < 1e-12, "{found:?}");
         // the speed that a short step gives is little of what a usual one needs
-        carried.learn(two, &push, (0.1, 0.001));
+        carried.learn(two.clone(), &push, (0.1, 0.001), 1.0);
         assert!((carried.of(0).x - 3.02).abs() < 1e-12);
+        carried.learn(two, &push, (0.1, 0.1), 0.25);
+        assert!((carried.of(0).x - 3.52).abs() < 1e-12);
     }
 }

@@ -35,8 +35,9 @@ use crate::sph::{
     particles::Vectors,
 };
 
-/// A particle whose det B is below this part of (⅓ tr B)³ has neighbours in a plane at most, and keeps A = 1.
-const FLAT: f64 = 0.01;
+/// A particle whose det B is below this part of (⅓ tr B)³ has neighbours near a plane, and keeps A = 1. Eigenvalues of A are
+/// at most 11 then.
+const FLAT: f64 = 0.2;
 
 /// Where less than this of the trace of 1 − K is left, walls are all around a particle, and it keeps A = 1.
 const LEAST_FREE: f64 = 0.1;

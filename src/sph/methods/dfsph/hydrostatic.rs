@@ -20,7 +20,7 @@ use super::walls::Walls;
 use crate::geom::Aabb;
 use crate::sph::{
     core::Core,
-    particles::{CHUNK, Vectors},
+    particles::{CHUNK, Vectors, add_scaled},
     reaction::Reaction,
     walls::Pushed,
 };
@@ -62,6 +62,7 @@ pub(super) fn has_opened(core: &Core) -> bool {
 }
 
 /// The hydrostatic pressure at the present places.
+#[derive(Clone)]
 pub(super) struct Hydrostatic {
     /// The body of fluid of each particle, and their number.
     bodies: (Vec<usize>, usize),
@@ -101,8 +102,28 @@ impl Hydrostatic {
         Self::of(core, self.bodies.clone(), |i| self.gravity.get(i) + change)
     }
 
-    /// Notes what walls bear of the fluid's weight.
-    pub fn note_walls(&self, core: &Core, (forces, walls): (&mut Solver, &Walls), reaction: Reaction<'_>) {
+    /// Notes what walls bear of the fluid's weight under the uniform gravity `g`, m/s², and what accelerates the fluid
+    /// with them besides. The sums find different parts of the two, as particles have more neighbours along some
+    /// directions than along others.
+    pub fn note_walls(
+        &self,
+        core: &Core,
+        (forces, walls): (&mut Solver, &Walls),
+        reaction: Reaction<'_>,
+        g: DVec3,
+    ) {
+        let still = Self::of(core, self.bodies.clone(), |_| g);
+        let mut rest = self.clone();
+        rest.pressure.iter_mut().zip(&still.pressure).for_each(|(p, still)| *p -= still);
+        add_scaled(&mut rest.gravity, &still.gravity, -1.0);
+        for part in [still, rest] {
+            if part.gravity.iter().any(|g| g != DVec3::ZERO) {
+                part.note_part(core, (&mut *forces, walls), reaction);
+            }
+        }
+    }
+
+    fn note_part(&self, core: &Core, (forces, walls): (&mut Solver, &Walls), reaction: Reaction<'_>) {
         let rest = core.parameters.rest_density;
         let s: Vec<f64> = self.pressure.iter().map(|p| p / (rest * rest)).collect();
         let mut push = Vectors::default();

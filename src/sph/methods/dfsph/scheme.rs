@@ -71,7 +71,6 @@ mod pressure;
 #[cfg(test)]
 mod symmetry_tests;
 
-use glam::DMat3;
 use smallvec::{SmallVec, smallvec};
 
 use super::super::{
@@ -87,7 +86,7 @@ use super::super::{
 use super::ahead::Ahead;
 use super::arrest::Arrest;
 use super::carried::Carried;
-use super::hydrostatic::{self, Hydrostatic};
+use super::hydrostatic;
 use super::passes::{Constants, Continuation, Densities, Drag};
 use super::rigid::Rigid;
 use super::solver::{Begin, Errors, Goal, RateOf, Solver};
@@ -126,16 +125,6 @@ const FIRST_TOLERANCE: f64 = 0.1;
 /// displacements cannot hold it. With all of it, and with a third, a column of eighty layers, eight wide,
 /// bursts at its start.
 pub(super) const OWED: f64 = 0.6;
-
-/// Longest step, as a part of 2/ω, for the fastest motion that pressure causes and that the solver does not
-/// see. (Eight layers lie still with 0.75 and burst with 1, as a column of eighty does.)
-const STABLE: f64 = 0.75;
-
-/// ω² beside walls over ω² in the depth, for each unit of ‖M‖². M completes an acceleration beside walls, and
-/// changes with the place as M∇K·M does. ‖M‖ is 2 at a plane, 2.8 in the corner of a box and 4 in a gap one
-/// spacing wide. Without this factor water that tapers off between a cylinder and a floor reaches 60 m/s, and
-/// columns of sixty and seventy layers, four wide, burst.
-const STIFFER_AT_WALLS: f64 = 0.375;
 
 /// The scheme. It keeps pressures and debts between steps; the rest is working memory.
 pub struct DivergenceFree {
@@ -335,21 +324,6 @@ impl DivergenceFree {
         self.surface = FreeSurface::of_lattice(ratio);
     }
 
-    /// The longest step, s, in which planes of particles that the present pressure holds together do not
-    /// overshoot. The solver does not see a motion that changes no density, so its forces are those at the
-    /// last places, and the motion grows if steps are longer than 2/ω.
-    fn pressure_dt(&self, core: &Core) -> f64 {
-        let rest = core.parameters.rest_density;
-        let in_the_depth = self.own_pressure.iter().copied().fold(0.0, f64::max);
-        let completed = if self.walls.mirrors().is_some() { &[][..] } else { self.walls.found() };
-        let at_walls = completed.iter().map(|(i, (_, completion))| {
-            STIFFER_AT_WALLS * square_of_norm(completion) * self.own_pressure[*i as usize]
-        });
-        let greatest = at_walls.fold(in_the_depth, f64::max) / rest;
-        let spacing = core.parameters.spacing();
-        STABLE * 2.0 * spacing / (self.stiffness * greatest).sqrt()
-    }
-
     /// Finds the order, walls, densities and factors for the present positions.
     pub(super) fn settle(&mut self, core: &mut Core, kept: &mut [&mut Vec<f64>]) {
         let mut columns: SmallVec<[&mut Vec<f64>; 8]> =
@@ -447,7 +421,11 @@ impl DivergenceFree {
         // particles that have a wall of a spacing between them belong to two bodies
         let bodies = core.parameters.fills_vessel.then(|| bodies(core, core.parameters.spacing()));
         if let Some(bodies) = &bodies {
-            full::find_unwanted(&mut self.free, bodies, found, relaxation);
+            let spacing = core.parameters.spacing();
+            let (position, velocity) = (&core.particles.position, &core.particles.velocity);
+            let motion = |i| (velocity.get(i) - self.whole.at(position.get(i))).length() / spacing;
+            full::lower(&mut self.forces.s, bodies);
+            full::find_unwanted(&mut self.free, bodies, found, motion, relaxation);
         } else {
             let (rates, densities, debts) = found;
             let unwanted = |((rate, rho), debt): ((&f64, &f64), &f64)| {
@@ -467,16 +445,8 @@ impl DivergenceFree {
             goal.most_iterations = goal.most_iterations.saturating_mul(FIRST_ITERATIONS);
         }
         self.iterations = self.forces.solve(core, &self.walls, &self.free, dt, goal, Begin::Last);
-        let hydrostatic = bodies.filter(|_| core.parameters.is_sealed).map(|bodies| {
-            self.carried.learn(bodies.clone(), &self.forces.push, (self.last_dt, dt), std::env::var("SH").map_or(pressure::mean_share(core, dt, relaxation), |s| s.parse().unwrap()));
-            Hydrostatic::of(core, bodies, |i| core.parameters.gravity - self.carried.of(i))
-        });
-        if let Some(reaction) = Reaction::of(core, dt) {
-            self.forces.note_walls(reaction, &self.walls, rest, (&self.forces.push, &self.forces.s));
-            if let Some(hydrostatic) = &hydrostatic {
-                hydrostatic.note_walls(core, (&mut self.forces, &self.walls), reaction);
-            }
-        }
+        let hydrostatic = self.find_hydrostatic(core, bodies, dt, relaxation);
+        self.note_walls(core, hydrostatic.as_ref(), dt);
         for ((free, rate), debt) in self.free.iter().zip(&self.forces.rate).zip(&mut self.debt) {
             let left = free + dt * rate;
             *debt = (*debt + dt * (left - *debt / relaxation)).max(0.0);
@@ -528,16 +498,6 @@ impl DivergenceFree {
         }
         !is_kept
     }
-}
-
-/// The square of the largest eigenvalue of a positive symmetric matrix, too large by 15 % at most: ‖M⁸‖^¼ in
-/// Frobenius' norm.
-fn square_of_norm(matrix: &DMat3) -> f64 {
-    let square = *matrix * *matrix;
-    let fourth = square * square;
-    let eighth = fourth * fourth;
-    let entries = eighth.to_cols_array();
-    entries.iter().map(|x| x * x).sum::<f64>().sqrt().powf(0.25)
 }
 
 /// The time, s, in which a debt is paid back after a step of the length `dt` with the greatest speed `speed`.
@@ -592,17 +552,5 @@ mod tests {
         }
         // without weight it is the time of the expected motion
         assert!(of(0.0, 0.0, 1e-7) < 0.5 * fall && of(0.0, 0.0, 1e-7) == of(0.0, 0.0, 1e-5));
-    }
-
-    #[test]
-    fn the_norm_of_a_completion_is_its_largest_eigenvalue() {
-        // 4, 2 and 1 along turned axes
-        let turn = DMat3::from_rotation_z(0.4) * DMat3::from_rotation_x(1.1);
-        let matrix = turn * DMat3::from_diagonal(DVec3::new(4.0, 2.0, 1.0)) * turn.transpose();
-        let found = square_of_norm(&matrix);
-        assert!((16.0..16.01).contains(&found), "{found}");
-        // where all are alike it is too large by the eighth root of three
-        let alike = square_of_norm(&(2.0 * DMat3::IDENTITY));
-        assert!((alike / (4.0 * 3_f64.powf(0.125)) - 1.0).abs() < 1e-12, "{alike}");
     }
 }
