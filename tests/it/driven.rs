@@ -547,3 +547,26 @@ scene s {{
         assert!(error.contains(told), "{gravity}: {error}");
     }
 }
+
+/// A blade that presses oil against the floor again and again. Particles that it pinched came to owe thrice their density,
+/// and as soon as they had escaped and were alone, they burst from the few that they met (86 m/s).
+#[test]
+#[ignore = "long"]
+fn what_a_blade_has_pinched_does_not_burst_later() {
+    let ended = run("rfm 1
+solid paddle = box([-4 mm, -30 mm, -25 mm], [4 mm, 30 mm, 25 mm])
+  .rotate([1, 0, 0], 3*t).rotate_z(12*t).move([50 mm, 50 mm, 30 mm])
+scene stirred {
+  box { min: [0, 0, 0], max: [100 mm, 100 mm, 100 mm] }
+  fluid oil {
+    shape: z <= 40 mm, particles: 1500, density: 0.9 g/cm^3, viscosity: 50 mPa·s, jitter: 0.2, seed: 7
+  }
+  obstacle { solid: paddle, walls: no_slip }
+  gravity: [0, 0, -9.81]
+  method: dfsph
+  run { until: 0.15 s, save_every: 0.05 s }
+}");
+    // the tips of the blade move with 0.5 m/s
+    let fastest = ended.unwrap_or_else(|e| panic!("{e}")).audit().max_speed();
+    assert!(fastest < 1.5, "{fastest} m/s");
+}

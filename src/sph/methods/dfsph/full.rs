@@ -10,7 +10,7 @@
 /// Part of a deviation from the mean density that is taken back within the relaxation time, or within the time in which a
 /// particle moves by a spacing as seen from the fluid as a whole, if that is longer: what does not move has a density of
 /// its own only where the lattice meets walls. (Taken back at rest, too, a full tank of water moved with 8 mm/s, and its
-/// pressure was 1.3 % too high. Without this term vortices are off by 8.0 % instead of 7.3.)
+/// pressure was 1.3 % too high. Without this term vortices are off by 8.0 % instead of 7.5.)
 const EVENED: f64 = 0.5;
 
 /// Finds the rates of density, kg/m³/s, that pressure has to take away, from those of the velocities, the densities,

@@ -21,7 +21,8 @@
 //! correct it. A column could sink endlessly within the tolerance while displacements lift it (a breaking dam
 //! gained 8 % of its energy in this way). So each particle remembers the error as a debt D of density, and
 //! the pressure pays it back within τ (Baumgarte 1972). The tolerance of this solve is that of the density
-//! over τ. A part of the density that displacements take away is added to the debt, see [`OWED`]. Velocities that
+//! over τ. A part of the density that displacements take away is added to the debt, see [`OWED`]. No particle owes more than
+//! its present density. Velocities that
 //! displacements undo are taken away, see [`Arrest`]. Where the fluid fills its vessel, the sums of forces are exact for
 //! flows that are linear in space, see [`corrected`](super::corrected), and neither is done.
 //!
@@ -412,6 +413,9 @@ impl DivergenceFree {
     /// Changes velocities by pressure so that nothing is compressed beyond the rest density.
     fn keep_density(&mut self, core: &mut Core, dt: f64) {
         let rest = core.parameters.rest_density;
+        // what walls press together cannot pay its debt; a particle that escaped with thrice its density as a debt burst away
+        // from the few that it met
+        self.debt.iter_mut().zip(&self.loaded).for_each(|(debt, density)| *debt = debt.min(*density));
         let relaxation = relaxation_time(&core.parameters, core.speed, dt);
         let is_corrected = core.parameters.fills_vessel && self.walls.mirrors().is_none();
         self.forces.correct(core, &self.walls, is_corrected);
