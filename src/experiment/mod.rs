@@ -13,6 +13,7 @@
 //! thread. [`Deviations`] compares the flow with the solution that the scene states.
 
 mod bodies;
+mod chamber;
 mod deviation;
 mod drag;
 mod dry;

@@ -307,7 +307,7 @@ impl Boundary {
             return (of_box.part > 0.0).then_some(of_box);
         }
         let mut whole = of_box.without_friction();
-        if let Some(taken) = self.maps.at_rest(p) {
+        if let Some(taken) = self.maps.in_box(self.broad_phase.at(p), p) {
             let plain = Wall { layer: None, ..*wall };
             let continuous =
                 if wall.layer.is_some() { self.of_box::<(), ()>(&plain, p) } else { whole.without_behind() };
@@ -316,12 +316,11 @@ impl Boundary {
         let (none, nothing) = (Coverage::<(), B>::default(), Coverage::default());
         for k in self.broad_phase.at(p) {
             match self.maps.of(k, p) {
-                Known::AtRest | Known::Nothing => {}
+                Known::AtRest | Known::Changing | Known::Nothing => {}
                 Known::Taken(taken) => {
                     let taken = taken.moving(self.field(k).wall_velocity(p));
                     whole = whole.or(&none.with_bodies(wall, &nothing, &taken));
                 }
-                Known::Changing(taken) => whole = whole.or(&none.with_bodies(wall, &nothing, &taken)),
                 Known::Parts(parts) => {
                     for (taken, velocity) in &parts {
                         whole = whole.or(&none.with_bodies(wall, &nothing, &taken.moving(*velocity)));

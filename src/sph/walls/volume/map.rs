@@ -49,6 +49,17 @@ impl Taken {
         Self { gradient: *rotation * self.gradient, moment: self.moment.turned(rotation), ..*self }
     }
 
+    /// That of two bodies beside each other, of which one may change its shape.
+    pub fn beside(&self, other: &Self) -> Self {
+        Self {
+            part: (self.part + other.part).min(1.0),
+            gradient: self.gradient + other.gradient,
+            moment: self.moment + other.moment,
+            sweep: self.sweep + other.sweep,
+            velocity: None,
+        }
+    }
+
     /// What bodies take that move with one velocity, m/s.
     pub fn moving(&self, velocity: DVec3) -> Self {
         Self { sweep: self.gradient.dot(velocity), velocity: Some(velocity), ..*self }

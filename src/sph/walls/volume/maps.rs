@@ -46,6 +46,8 @@ pub(in crate::sph) struct Maps {
     bodies: Vec<Body>,
     /// Whether any body moves without changing its shape.
     any_moves: bool,
+    /// Whether the maps of any body are known that changes its shape.
+    any_changes: bool,
 }
 
 enum Body {
@@ -106,8 +108,8 @@ pub(in crate::sph) enum Known {
     AtRest,
     /// It moves as a whole.
     Taken(Taken),
-    /// It changes its shape, and how that moves its surface is known too.
-    Changing(Taken),
+    /// It changes its shape, see [`Maps::in_box`].
+    Changing,
     /// What each of its parts takes, and the velocity at which this moves, m/s.
     Parts(Vec<(Taken, DVec3)>),
     /// It is not near.
@@ -140,7 +142,8 @@ impl Maps {
         };
         let bodies: Vec<Body> = obstacles.iter().map(body).collect();
         let any_moves = bodies.iter().any(|body| matches!(body, Body::Whole(_) | Body::Parts(_)));
-        let mut maps = Self { bodies, at_rest, any_moves };
+        let any_changes = bodies.iter().any(|body| matches!(body, Body::Changing(_)));
+        let mut maps = Self { bodies, at_rest, any_moves, any_changes };
         maps.move_to(time, time);
         maps
     }
@@ -183,7 +186,7 @@ impl Maps {
     pub fn part_of_moving(&self, k: usize, p: DVec3) -> f64 {
         let part = |rigid: &Rigid| match rigid.at(p) {
             Known::Taken(taken) => taken.part,
-            Known::AtRest | Known::Changing(_) | Known::Parts(_) | Known::Nothing | Known::ByFaces => 0.0,
+            Known::AtRest | Known::Changing | Known::Parts(_) | Known::Nothing | Known::ByFaces => 0.0,
         };
         match self.bodies.get(k) {
             Some(Body::Whole(whole)) => part(whole),
@@ -192,9 +195,18 @@ impl Maps {
         }
     }
 
-    /// What the obstacles at rest take of the kernel at a place in the box.
-    pub fn at_rest(&self, p: DVec3) -> Option<Taken> {
-        self.at_rest.as_ref()?.at(p)
+    /// What the obstacles at rest, and those of the `near` ones that change their shape, take of the part of the kernel
+    /// that lies in the box: their maps end there. Those of bodies that move as they are do not.
+    pub fn in_box(&self, near: impl Iterator<Item = usize>, p: DVec3) -> Option<Taken> {
+        let at_rest = self.at_rest.as_ref().and_then(|map| map.at(p));
+        if !self.any_changes {
+            return at_rest;
+        }
+        let changing = near.filter_map(|k| match self.bodies.get(k) {
+            Some(Body::Changing(changing)) => changing.at(p),
+            Some(Body::AtRest | Body::Whole(_) | Body::Parts(_) | Body::Unknown) | None => None,
+        });
+        at_rest.into_iter().chain(changing).reduce(|one, other| one.beside(&other))
     }
 
     /// What an obstacle takes of the kernel at a place.
@@ -202,14 +214,14 @@ impl Maps {
         match self.bodies.get(k) {
             Some(Body::AtRest) => Known::AtRest,
             Some(Body::Whole(whole)) => whole.at(p),
-            Some(Body::Changing(changing)) => changing.at(p).map_or(Known::Nothing, Known::Changing),
+            Some(Body::Changing(_)) => Known::Changing,
             Some(Body::Parts(parts)) => {
                 let mut taken = Vec::new();
                 for part in parts {
                     match part.at(p) {
                         Known::Taken(by_part) => taken.push((by_part, part.velocity(p))),
                         Known::Nothing => {}
-                        Known::AtRest | Known::Parts(_) | Known::Changing(_) | Known::ByFaces => {
+                        Known::AtRest | Known::Parts(_) | Known::Changing | Known::ByFaces => {
                             return Known::ByFaces;
                         }
                     }

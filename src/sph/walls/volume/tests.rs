@@ -209,7 +209,7 @@ fn parts_of_a_body_take_their_maps_along() {
         let found = match maps.of(0, place) {
             Known::Parts(found) => found,
             Known::Nothing => Vec::new(),
-            Known::AtRest | Known::Taken(_) | Known::Changing(_) | Known::ByFaces => panic!("{place}"),
+            Known::AtRest | Known::Taken(_) | Known::Changing | Known::ByFaces => panic!("{place}"),
         };
         let [by_slow, by_fast] = there.each_ref().map(|map| map.at(place).map_or(0.0, |taken| taken.part));
         let part_with = |rise: f64| {
