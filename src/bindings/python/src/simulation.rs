@@ -12,11 +12,13 @@ use pyo3::types::{PyDict, PyTuple, PyType};
 use rfm::Experiment;
 use rfm::diagnostic::Diagnostics;
 use rfm::experiment::probe_column;
+use rfm::fluid_surface::Reconstruction;
+use rfm::glam::DVec3;
 use rfm::sph::{Checkpoint, Simulation, StepError};
 
 use crate::begin::{Begun, Recorder, begin, recorders};
 use crate::error::{diagnostics, not_read, refused};
-use crate::mesh::write_file;
+use crate::mesh::{Found, PyMesh, write_file};
 use crate::pool::{LOOK, Threads, run, run_watched};
 use crate::program::PyProgram;
 use crate::show;
@@ -374,6 +376,38 @@ impl PySimulation {
             show_progress(py, &state.simulation, until, "\n")?;
         }
         result
+    }
+
+    /// The surface of the fluid as it is now: what ``rfm render --surface`` draws and ``rfm mesh DIR --fluid`` writes.
+    ///
+    /// The fluid goes up to a wall of the box that it touches, and never beyond it. Particles whose places are not finite
+    /// are left out.
+    ///
+    /// Parameters
+    /// ----------
+    /// cell : float, m, optional
+    ///     Size of a cell of the marching cubes; a quarter of `spacing` if it is not stated.
+    ///
+    /// Returns
+    /// -------
+    /// `Mesh`; an empty one without particles
+    ///
+    /// Raises
+    /// ------
+    /// RfmError
+    ///     If the cell is too small for the particles, or for the extent of the fluid.
+    #[pyo3(signature = (*, cell=None))]
+    fn surface(&self, py: Python<'_>, cell: Option<f64>) -> PyResult<PyMesh> {
+        let state = self.state()?;
+        let position = &state.simulation.particles().position;
+        let places: Vec<DVec3> =
+            (0..position.len()).map(|i| position.get(i)).filter(|p| p.is_finite()).collect();
+        let advised = Reconstruction::of_radius(0.5 * state.simulation.parameters().spacing());
+        drop(state);
+        let vessel = Some(self.experiment.domain());
+        let reconstruction = Reconstruction { cell: cell.unwrap_or(advised.cell), vessel, ..advised };
+        let made = run(py, self.threads, || reconstruction.mesh(&places))?;
+        Ok(Found::of_fluid(made.map_err(refused)?))
     }
 
     /// What energy, volume and densities have shown since the start: `Audit`.
