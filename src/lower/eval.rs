@@ -398,6 +398,7 @@ impl Lowering<'_> {
         }
         let operands: Vec<&Expr> = std::iter::once(first).chain(rest.iter().map(|(_, _, e)| e)).collect();
         self.warn_of_angle_as_length(&operands);
+        self.warn_of_length_as_area(&operands);
         self.warn_of_angle_out_of_range(&operands);
         let places: Vec<bool> = operands.iter().map(|operand| names_a_coordinate(operand)).collect();
         let has_place = places.contains(&true);

@@ -450,10 +450,16 @@ fn only_lofts_of_solids_are_asked_about() {
         "square.taper(1, 0.5)",
         "text(\"R\", 1)",
         "(x^2 + y^2 <= 1 + 0.1*sin(z))",
+        "box([0, 0, -1.5], [1, 1, 2.5])",
     ] {
         assert!(!told(outline), "{outline}");
     }
-    for solid in ["sphere(1)", "square.extrude(0, 1)", "box([0, 0, 0.2], [1, 1, 0.8])"] {
+    for solid in [
+        "sphere(1)",
+        "square.extrude(0, 1)",
+        "box([0, 0, 0.2], [1, 1, 0.8])",
+        "box([0, 0, -1.5], [1, 1, 1.5])",
+    ] {
         assert!(told(solid), "{solid}");
     }
 }

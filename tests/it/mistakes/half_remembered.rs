@@ -222,3 +222,18 @@ fn an_obstacle_that_is_a_file() {
     let found = messages("scene s {\n  box { max: [1, 1, 1] }\n  obstacle = \"post.stl\"\n}").to_string();
     assert!(found.contains("write `obstacle { solid: mesh(\"post.stl\") }`"), "{found}");
 }
+
+/// The fourth argument of an arc is an angle, or the tolerance of an arc through three points.
+#[test]
+fn an_arc_through_three_points_has_a_tolerance() {
+    let told = |tolerance: &str| {
+        messages(&format!("solid s = polygon(arc([0, 0], [1, 1], [2, 0], {tolerance})).extrude(0, 1)"))
+            .to_string()
+    };
+    assert!(told("3 s").contains("a time is not a length"), "{}", told("3 s"));
+    assert!(told("10 deg").contains("an angle is not a length"), "{}", told("10 deg"));
+    let arc = messages("solid s = polygon(arc([0, 0], 1, 0, 3 s)).extrude(0, 1)").to_string();
+    assert!(arc.contains("a time is not an angle"), "{arc}");
+    let arc = messages("solid s = polygon(arc([0, 0], 1, 0, 90 deg, 3 s)).extrude(0, 1)").to_string();
+    assert!(arc.contains("a time is not a length"), "{arc}");
+}
