@@ -500,7 +500,7 @@ impl PySimulation {
     fn save(&self, py: Python<'_>, folder: PathBuf) -> PyResult<PathBuf> {
         let state = self.state_to_change()?;
         let mut checkpoint = state.simulation.checkpoint();
-        checkpoint.fingerprint = self.experiment.fingerprint();
+        self.experiment.mark().stamp(&mut checkpoint);
         for recorder in &state.recorders {
             checkpoint.set(&probe_column(&recorder.name), recorder.gauge.memory().to_vec());
         }
@@ -534,8 +534,14 @@ impl PySimulation {
         let bytes = std::fs::read(&path).map_err(|error| not_read(&path.display().to_string(), error))?;
         let unusable = |why: String| refused(format!("cannot go on from `{}`: {why}", path.display()));
         let checkpoint = Checkpoint::read(&bytes).map_err(|error| unusable(error.to_string()))?;
-        if checkpoint.fingerprint != self.experiment.fingerprint() {
-            return Err(unusable("it belongs to another scene, or this one was changed since".into()));
+        let mark = self.experiment.mark();
+        if !mark.fits(&checkpoint) {
+            let mut why = "it belongs to another scene, or this one was changed since".to_string();
+            let differences = mark.differences(&checkpoint);
+            if !differences.is_empty() {
+                why.push_str(&format!(": {}", differences.join(", ")));
+            }
+            return Err(unusable(why));
         }
         let resumed = run(py, self.threads, || {
             let mut simulation =
