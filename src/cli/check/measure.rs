@@ -279,7 +279,7 @@ fn refine(
     let mut needed = if thin.count == 0 { Some(2 * VOLUME_CELLS) } else { thin.cells_needed(grid) };
     for _ in 0..REFINED {
         let can_be_had = |&cells: &usize| cells > VOLUME_CELLS && on_faces(bounds, cells) <= MOST_ON_FACES;
-        let Some(cells) = needed.filter(can_be_had) else { return None };
+        let cells = needed.filter(can_be_had)?;
         let Ok(grid) = Grid::around(bounds, Resolution::Cells(cells)) else { return None };
         let no_time = format!(
             "there was no time to measure `{}` with the {cells} cells that show its thin parts; --budget gives it more",
