@@ -86,7 +86,8 @@ impl Slip<'_> {
             rest.is_some_and(|rest| rest.trim_start().starts_with(char::is_alphabetic))
         };
         let word = ITEM_WORDS.into_iter().find(is_head)?;
-        (self.in_braces() && matches!(self.found, "=" | "(")).then(|| {
+        // a block that begins on this line is not around it
+        (self.in_braces() && !line.contains('{') && matches!(self.found, "=" | "(")).then(|| {
             let start = self.at - line.len();
             let span = Span::new(self.span.source, start, start + word.len());
             Diagnostic::error(Code::SYNTAX, span, format!("`{word}` within a block"))

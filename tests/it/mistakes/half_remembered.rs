@@ -262,6 +262,7 @@ fn first_files_of_new_users() {
         (format!("scene a {{ {room} {pool} run {{ steps: 100 }} }}"), "`rfm run FILE --steps 100`"),
         ("solid bunny = mesh(bunny.stl)".into(), "write `\"bunny.stl\"`"),
         ("solid a = a or sphere(1)".into(), "nothing can be made of itself"),
+        ("solid s = polygon([for i in 0..5: [i, i^2]]).extrude(0, 1)".into(), "write `list i in 0..5: …`"),
         (
             "solid s = polygon([[0, 0], [1, 0], [0, 1]]).extrude(h = 1)".into(),
             "write for example `.extrude(0, 1)`",
