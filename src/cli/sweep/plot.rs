@@ -3,11 +3,10 @@
 
 use std::fmt::Write;
 
-use super::super::output::significant;
 use super::super::plot::{self, Legend};
 use super::figures::is_said_elsewhere;
 use super::index::{Index, Row};
-use rfm::slice;
+use rfm::{geom, slice};
 
 /// Maximum number of panels: the first figures are the main ones.
 const MOST_PANELS: usize = 12;
@@ -79,7 +78,10 @@ pub(super) fn draw(index: &Index) -> String {
 fn remarks(index: &Index, same: &[&str], more: &[&str], width: f64) -> Vec<String> {
     let value = |name: &&str| {
         let first = index.figures(name).next();
-        first.map_or_else(|| (*name).to_string(), |figure| format!("{name} {}", significant(figure.value, 5)))
+        first.map_or_else(
+            || (*name).to_string(),
+            |figure| format!("{name} {}", geom::significant(figure.value)),
+        )
     };
     let same: Vec<String> = same.iter().map(value).collect();
     let more: Vec<String> = more.iter().map(|name| (*name).to_string()).collect();
