@@ -30,9 +30,6 @@ const CELLS_OF_DISTANCE: usize = 192;
 /// Distance beside its plane at which a section is tested, as a part of the window: less than a pixel.
 const BESIDE: f64 = 1e-5;
 
-/// A plane that shares more than this part of the window with a face of the solid lies within that face.
-const OF_A_FACE: f64 = 2e-3;
-
 /// Plots what the flags ask for. Returns warnings about what the plot shows.
 pub(super) fn plot(shared: &Shared, options: &Check, program: &Program) -> Result<Vec<Diagnostic>, Failure> {
     let names: Vec<Option<&str>> = match &options.solid[..] {
@@ -322,20 +319,21 @@ fn sought(plane: Plane, window: Window) -> impl Iterator<Item = DVec3> {
 }
 
 /// If a plane lies within a face of a solid, how far beside it the section is drawn: on the side with less of
-/// the solid.
+/// the solid. A face is seen by four points beside each other; an edge in the plane has no more than rows of them.
 fn out_of_a_face(solid: &Solid, plane: Plane, window: Window) -> Option<f64> {
     let aside = BESIDE * window.size().max_element();
     let step = DVec3::AXES[plane.axis.index()] * aside;
-    let (mut within, mut before, mut behind) = (0, 0, 0);
-    for p in sought(plane, window) {
+    let (mut within, mut before, mut behind) = (vec![false; SOUGHT * SOUGHT], 0, 0);
+    for (k, p) in sought(plane, window).enumerate() {
         let [on, low, high] = [p, p - step, p + step].map(|p| solid.omega(p));
         // the rounding of ω is far below what it is at this distance from a face
-        within += usize::from(on.abs() < 1e-3 * low.abs().max(high.abs()));
+        within[k] = on.abs() < 1e-3 * low.abs().max(high.abs());
         before += usize::from(low > 0.0);
         behind += usize::from(high > 0.0);
     }
-    let is_within = within as f64 > OF_A_FACE * (SOUGHT * SOUGHT) as f64;
-    is_within.then_some(if before < behind { -aside } else { aside })
+    let four = |k: usize| [k, k + 1, k + SOUGHT, k + SOUGHT + 1].iter().all(|&k| within[k]);
+    let mut corners = (0..SOUGHT * (SOUGHT - 1)).filter(|k| k % SOUGHT + 1 < SOUGHT);
+    corners.any(four).then_some(if before < behind { -aside } else { aside })
 }
 
 fn in_a_face(solid: &Solid, plane: Plane) -> String {

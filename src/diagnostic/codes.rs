@@ -320,6 +320,12 @@ everywhere, so that `45 deg in 0 .. 90` reaches to 90 radians, which are 14 turn
     rfm 1
     param alpha = 45 deg in 0 .. 90                          # 45 deg in 0 .. 90 deg
     solid s = box().rotate_z(alpha)";
+LENGTH_AS_AREA = "W0429":
+"Squares of coordinates are an area in square metres, and what they are compared with has the unit of a length:
+`x^2 + y^2 <= 500 mm` is a circle with the radius √0.5 m, not 500 mm. Square the radius, too, or compare `hypot(x, y)` with it.
+
+    rfm 1
+    solid post = x^2 + y^2 <= 500 mm and 0 <= z <= 1         # x^2 + y^2 <= (500 mm)^2";
 FLUID_IN_OBSTACLE = "W0501":
 "Part of the fluid's shape lies inside an obstacle, or outside the box or the container. Those particles are carved off before the
 run starts. `rfm run` counts them. `rfm check` and editors estimate by samples how much of the shape is taken, and tell of it where
@@ -441,6 +447,11 @@ sums are right: volume and compression, which are found by the same sums, show n
 Plates that pressed a layer of ten spacings to four within 6 ms bore three times the force; pressed to three, the layer had 2.9 times
 the energy that it should have. There finer particles, a jitter and shifting hardly help; a slower motion does, in which particles
 have the time to change places. For a fluid that is drawn out slowly `shifting: 1` helps, and with `wcsph` `gradients: differences`.";
+ODD_QUANTITY = "W0529":
+"A key of the scene has a value that hardly anyone means: a surface tension that no liquid has, the gravity of the Earth as a
+number of millimetres, or a `support_radius` far larger than the one of the method. Most often it is in another unit: a number
+without a unit is in SI units. `support_radius` says how far sums over neighbours reach; left out, it follows from the spacing of
+the particles, so it need hardly ever be stated.";
 OBSTACLE_FILLS_BOX = "E0502":
 "The obstacle covers every place where fluid was to be put: nothing is left to simulate.";
 }

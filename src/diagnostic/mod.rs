@@ -128,6 +128,11 @@ impl Diagnostic {
         self
     }
 
+    /// Whether the message is about no place of the file: a param is set that it does not declare.
+    pub(crate) fn is_about_no_place(&self) -> bool {
+        self.code == Code::OVERRIDE && self.primary.span.range().is_empty()
+    }
+
     /// The edit, if the text holds at its place what it replaces.
     pub fn edit_of(&self, source: &Source) -> Option<&Edit> {
         self.edit.as_ref().filter(|edit| {

@@ -2,7 +2,9 @@
 
 use std::borrow::Cow;
 
-use annotate_snippets::{Annotation, AnnotationKind, Group, Level, Renderer, Snippet, renderer::DecorStyle};
+use annotate_snippets::{
+    Annotation, AnnotationKind, Group, Level, Origin, Renderer, Snippet, renderer::DecorStyle,
+};
 
 use super::{Diagnostic, Diagnostics, Label, Severity, Source, Span, is_hidden, printable, printable_line};
 
@@ -56,7 +58,9 @@ fn groups<'a>(diagnostic: &'a Diagnostic, sources: &'a [Source]) -> Vec<Group<'a
             .chain(diagnostic.secondary.iter().map(|label| (AnnotationKind::Context, label)))
             .filter(|(_, label)| label.span.source == source.id)
             .collect();
-        if !labels.is_empty() {
+        if diagnostic.is_about_no_place() && source.id == diagnostic.primary.span.source {
+            group = group.element(Origin::path(printable_line(&source.name)));
+        } else if !labels.is_empty() {
             group = group.element(snippet(source, &labels));
         }
     }

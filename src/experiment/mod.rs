@@ -52,6 +52,7 @@ pub use bodies::Body;
 pub use deviation::{Deviation, Deviations};
 pub use every::Every;
 pub use filling::spacing;
+pub use fingerprint::SceneMark;
 pub use mean::Mean;
 pub use misfits::{MOST_OBSTACLES, out_of_reach, too_fine, wall_limit};
 pub use out_of_reach::is_out_of_reach;
@@ -139,6 +140,7 @@ impl Experiment {
         }
         let warnings = clamped.into_iter().chain(too_long).chain(parameters::stirring(&scene, &parameters));
         let warnings = warnings.chain(parameters::slow_sound(&scene, &parameters));
+        let warnings = warnings.chain(parameters::wide_support(&scene, &parameters));
         let warnings = warnings.chain(parameters::many_steps(&scene, &parameters));
         let warnings = warnings.chain(parameters::without_friction(&scene, &parameters));
         let warnings = warnings.chain(drag::warnings(&scene, &parameters, &bodies));

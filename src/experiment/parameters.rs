@@ -150,6 +150,28 @@ pub(super) fn slow_sound(scene: &Scene, parameters: &Parameters) -> Option<Diagn
     })
 }
 
+/// A stated support radius gets a warning if it is more than so many times the one that the method would take: each
+/// particle then has many times as many neighbours.
+const WIDE_SUPPORT: f64 = 2.5;
+
+/// A warning if a stated support radius makes neighbours of far more particles than the method needs.
+pub(super) fn wide_support(scene: &Scene, parameters: &Parameters) -> Option<Diagnostic> {
+    let at = scene.fluid.support_span?;
+    let (stated, spacing) = (parameters.support_radius, parameters.spacing());
+    let usual = scene.method.support(parameters.surface_tension > 0.0).radius(spacing);
+    (stated > WIDE_SUPPORT * usual).then(|| {
+        let rounded = |value: f64| format!("{value:.1e}").parse().unwrap_or(value);
+        let message = format!(
+            "`support_radius` is {} times the one that this method takes for particles {} m apart: sums over so many \
+             neighbours smear the fluid out, and take long",
+            rounded(stated / usual),
+            rounded(spacing)
+        );
+        let help = format!("leave it out: here it would be {} m", rounded(usual));
+        Diagnostic::warning(Code::ODD_QUANTITY, at, message).help(help)
+    })
+}
+
 /// A warning if negative pressures are cut off in a fluid that fills its room, only because of another key.
 pub(super) fn clamped(scene: &Scene, method: &Method, has_surface: &dyn Fn() -> bool) -> Option<Diagnostic> {
     let Method::Wcsph(wcsph) = method else { return None };

@@ -181,8 +181,11 @@ impl Experiment {
                     "within the obstacles"
                 };
                 let message = format!("the shape of the fluid lies {place}: none of it is free");
-                Diagnostic::error(Code::OBSTACLE_FILLS_BOX, fluid.shape_span, message)
-                    .help("move the shape of the fluid out of the obstacles, or make it larger")
+                Diagnostic::error(Code::OBSTACLE_FILLS_BOX, fluid.shape_span, message).help(
+                    self.vessel_as_an_obstacle().unwrap_or_else(|| {
+                        "move the shape of the fluid out of the obstacles, or make it larger".into()
+                    }),
+                )
             }
             SeedError::TooLarge { sites }
                 if sites.is_finite() && fluid.size_span.is_none() && fluid.particles.is_some() =>
@@ -227,8 +230,10 @@ impl Experiment {
                 let message = format!("no particle is left: {}", self.reasons(carved));
                 let is_in_one = !self.scene.obstacles.is_empty() && carved.inside + carved.too_close > 0;
                 let help = match is_in_one {
-                    false => "move the shape of the fluid into the room that it may fill",
-                    true => "move the shape of the fluid out of the obstacles",
+                    false => "move the shape of the fluid into the room that it may fill".into(),
+                    true => self
+                        .vessel_as_an_obstacle()
+                        .unwrap_or_else(|| "move the shape of the fluid out of the obstacles".into()),
                 };
                 Diagnostic::error(Code::OBSTACLE_FILLS_BOX, fluid.shape_span, message).help(help)
             }
@@ -259,6 +264,20 @@ impl Experiment {
     /// Whether no part of the fluid's shape lies in the container, as far as samples show.
     fn is_outside_the_container(&self) -> bool {
         self.scene.container.is_some() && self.is_covered_by(&self.bodies[..1])
+    }
+
+    /// What helps if all of the fluid lies in one obstacle, which may be its vessel.
+    fn vessel_as_an_obstacle(&self) -> Option<String> {
+        if self.scene.container.is_some() {
+            return None;
+        }
+        let holds = |body: &Body| self.is_covered_by(std::slice::from_ref(body));
+        let (obstacle, _) = self.scene.obstacles.iter().zip(&self.bodies).find(|(_, body)| holds(body))?;
+        let name = &obstacle.name;
+        Some(format!(
+            "move the shape of the fluid out of it; if `{name}` is the vessel that holds the fluid, it is no `obstacle`, but a \
+             `container`"
+        ))
     }
 
     fn is_covered_by(&self, bodies: &[Body]) -> bool {

@@ -1,6 +1,6 @@
 //! Functions that are operations of the graph rather than text of the prelude.
 
-use super::dimensions::is_foreign_quantity;
+use super::dimensions::{Measure, is_foreign_quantity};
 use super::lowering::Lowering;
 use super::value::Value;
 use crate::diagnostic::{Code, Diagnostic, Span};
@@ -88,23 +88,49 @@ const COMPOSED: [Builtin; 31] = {
         builtin("sweep", (2, 2), Value(|l, values, arguments, span| l.sweep(values, arguments, span))),
         builtin("text", (2, 2), Value(|l, values, arguments, span| l.text(values, arguments, span))),
         builtin("around", (2, 2), Number(|l, a, span| l.around(a[0], a[1], span))),
-        builtin("overlapping", (2, 2), Number(|l, a, span| l.overlapping(a[0], a[1], span))),
+        builtin("overlapping", (4, 4), Number(|l, a, span| l.overlapping([a[0], a[1]], [a[2], a[3]], span))),
         builtin("slope", (1, 1), Number(|l, a, span| l.slope(a[0], span))),
         builtin("normalise", (1, 1), Number(|l, a, span| l.normalise(a[0], span))),
         builtin("normalize", (1, 1), Number(|l, a, span| l.normalise(a[0], span))),
     ]
 };
 
-/// How what a count is for is told in the standard solids.
-const NUMBER_OF: &str = "the number of";
-
 const POSITIVE: Builtin = Builtin {
     name: "positive",
-    arity: (1, 2),
-    meaning: Meaning::Unevaluated(|l, arguments, span| {
-        l.positive(&arguments[0].value, arguments.get(1).map(|what| &what.value), span)
-    }),
+    arity: (1, 3),
+    meaning: Meaning::Unevaluated(|l, arguments, span| l.positive(arguments, span)),
 };
+
+/// What a positive number is, where a message needs more than its words: the third argument of `positive`.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Sort {
+    /// A length, or what is like one.
+    Plain,
+    /// A number of copies.
+    Count,
+    /// The distance of two bounds that were written.
+    Between([&'static str; 2]),
+    /// The distance of two corners along an axis.
+    OfBox,
+    /// The thickness of a wall.
+    OfWall,
+}
+
+impl Sort {
+    /// The sort that the standard solids name.
+    fn named(expr: &Expr) -> Option<Self> {
+        let ExprKind::Name(name) = &expr.kind else { return None };
+        [
+            ("count", Self::Count),
+            ("layer", Self::Between(["low", "high"])),
+            ("loft", Self::Between(["z0", "z1"])),
+            ("box", Self::OfBox),
+            ("shell", Self::OfWall),
+        ]
+        .into_iter()
+        .find_map(|(known, sort)| (known == name).then_some(sort))
+    }
+}
 
 /// Where operations stand in lists of builtins.
 #[derive(Clone, Copy, PartialEq, Eq)]
@@ -155,9 +181,7 @@ impl Lowering<'_> {
         match builtin.meaning {
             Meaning::Unevaluated(build) => build(self, arguments, span),
             Meaning::Value(build) => {
-                let angles =
-                    if builtin.name == "arc" && arguments.len() > 3 { &arguments[2..4] } else { &[] };
-                if !angles.iter().all(|a| !is_foreign_quantity(&a.value) || self.may_be_angle(&a.value)) {
+                if builtin.name == "arc" && !self.arc_measures(arguments) {
                     return Value::Failed;
                 }
                 self.values(arguments).map_or(Value::Failed, |values| build(self, &values, arguments, span))
@@ -184,6 +208,18 @@ impl Lowering<'_> {
                 self.vectors(arguments).map_or(Value::Failed, |v| Value::Vector(build(self, &v, span)))
             }
         }
+    }
+
+    /// Whether quantities of an arc may measure what they stand for, as far as their units tell. If not, this is reported.
+    fn arc_measures(&mut self, arguments: &[Argument]) -> bool {
+        let is_point = |argument: &Argument| matches!(argument.value.kind, ExprKind::Vector(_));
+        // an arc through three points has a tolerance in the place of an angle
+        let angles = if arguments[1..].iter().take(2).any(is_point) { 0..0 } else { 2..4 };
+        let foreign = arguments.iter().enumerate().filter(|(_, a)| is_foreign_quantity(&a.value));
+        foreign.into_iter().all(|(i, argument)| match angles.contains(&i) {
+            true => self.may_be_angle(&argument.value),
+            false => self.measures(&argument.value, Measure::Length),
+        })
     }
 
     /// What is wrong with the number of arguments, or with names given to them.
@@ -346,15 +382,15 @@ impl Lowering<'_> {
         }
     }
 
-    /// The value itself. If it is known now and not positive, an error is reported at the argument that it
-    /// came from.
-    fn positive(&mut self, value: &Expr, what: Option<&Expr>, span: Span) -> Value {
+    /// The value itself, which comes first. If it is known now and not positive, an error is reported at the argument that
+    /// it came from, with the words that come second.
+    fn positive(&mut self, arguments: &[Argument], span: Span) -> Value {
+        let value = &arguments[0].value;
         let result = self.expr(value);
         let Value::Number(node) = result else { return result };
         let Some(number) = self.known_value(node) else { return result };
-        let is_count =
-            matches!(what.map(|what| &what.kind), Some(ExprKind::Text(text)) if text.starts_with(NUMBER_OF));
-        let is_broken = is_count && number.fract() != 0.0;
+        let sort = arguments.get(2).and_then(|sort| Sort::named(&sort.value)).unwrap_or(Sort::Plain);
+        let is_broken = sort == Sort::Count && number.fract() != 0.0;
         if number > 0.0 && number.is_finite() && !is_broken {
             return result;
         }
@@ -362,41 +398,43 @@ impl Lowering<'_> {
             ExprKind::Name(name) => self.scope.locals.iter().rev().find(|l| l.name == *name).map(|l| l.span),
             _ => None,
         };
-        let what = match what.map(|w| &w.kind) {
-            Some(ExprKind::Text(text)) => text.as_str(),
-            _ => "the value",
-        };
         let at = self.user_span(origin.unwrap_or(span));
         let wanted = if is_broken { "a whole number" } else { "positive" };
         // what the user wrote may be made of a layer
         let call = self.scope.calls.iter().find(|call| !call.source.is_users()).map(|call| &*call.function);
-        let what = match (what, call) {
-            ("the thickness of a layer", Some("extrude")) => "the height of what is extruded",
-            _ => what,
+        let (what, sort) = match (arguments.get(1).map(|what| &what.value.kind), sort, call) {
+            (_, Sort::Between(_), Some("extrude")) => {
+                ("the height of what is extruded", Sort::Between(["z0", "z1"]))
+            }
+            (Some(ExprKind::Text(text)), sort, _) => (text.as_str(), sort),
+            (_, sort, _) => ("the value", sort),
         };
         let message = format!("{what} must be {wanted}, found {number}");
         let diagnostic = Diagnostic::error(Code::OUT_OF_RANGE, at, message);
-        let ends = match what {
-            "the height of what is extruded" | "the height of a loft" => Some(["z0", "z1"]),
-            "the thickness of a layer" => Some(["low", "high"]),
-            _ => None,
-        };
-        if let Some([low, high]) = ends {
-            return self.fail(diagnostic.help(match number < 0.0 {
+        match self.help_for(sort, number, at) {
+            Some(help) => self.fail(diagnostic.help(help)),
+            None => self.fail(diagnostic),
+        }
+    }
+
+    /// What helps with a number that is to be positive and is not.
+    fn help_for(&self, sort: Sort, number: f64, at: Span) -> Option<String> {
+        let is_negative = number < 0.0 && number.is_finite();
+        match sort {
+            Sort::Plain | Sort::Count => None,
+            Sort::Between([low, high]) => Some(match number < 0.0 {
                 true => format!("`{low}` is above `{high}`: exchange them"),
                 false => format!("`{low}` is to be less than `{high}`"),
-            }));
+            }),
+            Sort::OfBox => is_negative.then(|| {
+                "the first corner of a box has the smaller coordinates: `box(min, max)`".to_string()
+            }),
+            Sort::OfWall => is_negative.then(|| self.help_for_wall(number, at)),
         }
-        let is_negative = number < 0.0 && number.is_finite();
-        if is_negative && what.starts_with("the size of a box along") {
-            return self.fail(
-                diagnostic.help("the first corner of a box has the smaller coordinates: `box(min, max)`"),
-            );
-        }
-        if !is_negative || what != "the thickness of a shell" {
-            return self.fail(diagnostic);
-        }
-        // a formula has more signs than its first
+    }
+
+    /// What helps with a wall of negative thickness. A formula has more signs than its first.
+    fn help_for_wall(&self, number: f64, at: Span) -> String {
         let is_one = |text: &&str| {
             let (number, unit) = text.split_once(' ').unwrap_or((text, ""));
             number.starts_with(|c: char| c.is_ascii_digit() || c == '.')
@@ -411,10 +449,10 @@ impl Lowering<'_> {
             },
             str::to_string,
         );
-        self.fail(diagnostic.help(format!(
+        format!(
             "a wall lies inside of the surface: write `.shell({width})`; for one outside of it, write \
              `.offset({width}).shell({width})`"
-        )))
+        )
     }
 }
 

@@ -208,6 +208,28 @@ impl Lowering<'_> {
         );
     }
 
+    /// Warns of squares of coordinates that are compared with a length, as in `x² + y² <= 500 mm`.
+    pub fn warn_of_length_as_area(&mut self, operands: &[&Expr]) {
+        let is_length = |operand: &&&Expr| self.dimension(operand) == Some(Dimension::LENGTH);
+        let Some(length) = operands.iter().find(is_length).filter(|length| length.span.source.is_users())
+        else {
+            return;
+        };
+        let Some(area) = operands.iter().find(|operand| is_area(operand)) else { return };
+        let squared = match (&length.kind, self.written(length)) {
+            (ExprKind::Name(_), Some(written)) => format!("{written}^2"),
+            (_, Some(written)) => format!("({written})^2"),
+            (_, None) => "(5 mm)^2".to_string(),
+        };
+        let message = "squares of coordinates, which are an area, are compared with a length";
+        self.report(
+            Diagnostic::warning(Code::LENGTH_AS_AREA, length.span, message)
+                .at("taken as a number of square metres")
+                .label(area.span, "an area")
+                .help(format!("if this is the radius, write `{squared}`")),
+        );
+    }
+
     /// Whether an argument may measure what is asked for, as far as its units tell. If not, this is reported. Of a
     /// vector, each component is looked at.
     pub fn measures(&mut self, expr: &Expr, wanted: Measure) -> bool {
@@ -273,6 +295,21 @@ fn is_coordinate(expr: &Expr) -> bool {
         ExprKind::Sum { first, rest } => {
             is_coordinate(first) || rest.iter().any(|(_, term)| is_coordinate(term))
         }
+        _ => false,
+    }
+}
+
+/// Whether an expression is a square of a coordinate, or a sum of such.
+fn is_area(expr: &Expr) -> bool {
+    match &expr.kind {
+        ExprKind::Power { base, exponent } => {
+            is_coordinate(base) && matches!(exponent.kind, ExprKind::Number(number) if number == 2.0)
+        }
+        ExprKind::Product { first, rest } => match &rest[..] {
+            [(MulOp::Multiply, second)] => is_coordinate(first) && is_coordinate(second),
+            _ => false,
+        },
+        ExprKind::Sum { first, rest } => is_area(first) && rest.iter().all(|(_, term)| is_area(term)),
         _ => false,
     }
 }

@@ -232,7 +232,14 @@ impl Lowering<'_> {
             return self
                 .fail(diagnostic.help(format!("write `{qualified}`")).edit(span, name, qualified, false));
         }
+        if let Some(path) = self.path_without_quotes(name, span) {
+            return self.fail(diagnostic.at("a path stands in quotes").help(format!("write `\"{path}\"`")));
+        }
         let diagnostic = match (later, foreign::value(name, self.in_scene)) {
+            (Some(later), _) if later.start < span.start => diagnostic
+                .at("not defined yet")
+                .label(later, "defined here")
+                .help("nothing can be made of itself: give one of both another name"),
             (Some(later), _) => diagnostic
                 .at("not defined above")
                 .label(later, "defined here")
@@ -256,6 +263,14 @@ impl Lowering<'_> {
             }
         };
         self.fail(diagnostic)
+    }
+
+    /// `bunny.stl`, of which the name is the beginning.
+    fn path_without_quotes(&self, name: &str, span: Span) -> Option<String> {
+        const ENDINGS: [&str; 7] = ["stl", "obj", "ply", "csv", "png", "txt", "asc"];
+        let rest = self.text.get(span.range().end..).filter(|_| span.source == SourceId::File)?;
+        let ending: String = rest.strip_prefix('.')?.chars().take_while(|c| c.is_alphanumeric()).collect();
+        ENDINGS.contains(&ending.to_lowercase().as_str()).then(|| format!("{name}.{ending}"))
     }
 
     pub fn negate(&mut self, value: &Value, span: Span) -> Value {
@@ -398,6 +413,7 @@ impl Lowering<'_> {
         }
         let operands: Vec<&Expr> = std::iter::once(first).chain(rest.iter().map(|(_, _, e)| e)).collect();
         self.warn_of_angle_as_length(&operands);
+        self.warn_of_length_as_area(&operands);
         self.warn_of_angle_out_of_range(&operands);
         let places: Vec<bool> = operands.iter().map(|operand| names_a_coordinate(operand)).collect();
         let has_place = places.contains(&true);

@@ -83,10 +83,22 @@ impl Lowering<'_> {
     ) -> Option<Diagnostic> {
         let mut written = vec![self.written(receiver).unwrap_or("a")];
         written.extend(arguments.iter().map(|a| self.written(&a.value).unwrap_or("b")));
+        let by_axes = |arguments: &[Argument], method: &str| {
+            let of = |axis: &str| {
+                let given = arguments.iter().find(|a| a.name.as_ref().is_some_and(|name| name.text == axis));
+                given.map(|a| self.written(&a.value).unwrap_or("b").to_string())
+            };
+            let all = ["x", "y", "z"].map(of);
+            let is_all = !arguments.is_empty() && all.iter().flatten().count() == arguments.len();
+            let left_out = if method == "scale" { "1" } else { "0" };
+            is_all.then(|| all.map(|part| part.unwrap_or_else(|| left_out.to_string())))
+        };
         let message = format!("shapes have no method `{}`", method.text);
         let diagnostic = Diagnostic::error(Code::UNKNOWN_NAME, method.span, message);
         if let Some(known) = foreign::method(&method.text) {
-            let call = foreign::method_call(&method.text, &written[1..].join(", "))?;
+            let by_axis = by_axes(arguments, known).map(|how| how.join(", "));
+            let arguments = by_axis.unwrap_or_else(|| written[1..].join(", "));
+            let call = foreign::method_call(&method.text, &arguments)?;
             return Some(diagnostic.at(format!("`.{known}` here")).help(format!("write `{call}`")));
         }
         let Words { what, help } =
@@ -154,6 +166,9 @@ pub(super) fn parameter(function: &str, given: &str, parameters: &[&str]) -> Opt
              `cylinder(2, 3).taper(3, 0.5)`, which is half as wide at its top"
                 .to_string(),
         ),
+        "h" | "height" | "length" | "depth" if function == "extrude" => {
+            Some("it leads from z0 to z1: write for example `.extrude(0, 1)` for a height of 1".to_string())
+        }
         "radius" => called("r"),
         "height" | "length" | "l" => called("h"),
         "center" | "origin" => called("centre").or_else(|| called("point")),

@@ -288,8 +288,14 @@ impl Lowering<'_> {
                     |part: &Value| matches!(part, Value::Number(node) if self.depends_on_place(*node));
                 let holds_shapes =
                     matches!(other, Value::List(parts) if !parts.is_empty() && parts.iter().all(is_shape));
-                let help = "`any part in parts: part` joins the shapes of a list `parts`";
-                self.report(if holds_shapes { diagnostic.help(help) } else { diagnostic });
+                self.report(match other {
+                    _ if holds_shapes => {
+                        diagnostic.help("`any part in parts: part` joins the shapes of a list `parts`")
+                    }
+                    Value::Vector(_) => diagnostic
+                        .help("numbers are wanted here: take its components, `v.x`, `v.y` and `v.z`, or its `length(v)`"),
+                    Value::List(_) | Value::Text(_) | Value::Number(_) | Value::Failed => diagnostic,
+                });
                 None
             }
         }

@@ -37,9 +37,9 @@ impl Lowering<'_> {
         self.least_with_round(field, p, bounds.centre().to_array(), radius, span)
     }
 
-    /// The second of two outlines, between which a loft leads: they must not lie beside each other. Solids in their
-    /// place are asked about.
-    pub fn overlapping(&mut self, a: Node, b: Node, span: Span) -> Node {
+    /// The second of two outlines, between which a loft leads from one height to another: they must not lie beside each
+    /// other. Solids in their place are asked about.
+    pub fn overlapping(&mut self, [a, b]: [Node; 2], heights: [Node; 2], span: Span) -> Node {
         let [x, y, z] = Axis::SPACE.map(|axis| self.module.graph.coordinate(axis));
         let [zero, one] = [0.0, 1.0].map(|number| self.constant(number));
         let rest = self.binary(Binary::Sub, one, z, span);
@@ -55,7 +55,7 @@ impl Lowering<'_> {
             let message = "the outlines of a loft lie beside each other, and a loft holds only what lies between overlapping ones";
             let help = "move one over the other with `.move`; a tube from place to place is `sweep([[0, 0, 0], [3, 0, 1]], 0.1)`";
             self.report(Diagnostic::error(Code::OUTLINE, self.user_span(span), message).help(help));
-        } else if [a, b].into_iter().any(|shape| self.ends_along_z(shape)) {
+        } else if [a, b].into_iter().any(|shape| self.ends_along_z(shape, heights)) {
             let message =
                 "a loft leads from outline to outline, and here is a solid that ends along z by itself";
             self.report(
@@ -66,10 +66,16 @@ impl Lowering<'_> {
         b
     }
 
-    /// Whether a shape has proven ends along z. An outline that turns or narrows along z has none.
-    fn ends_along_z(&self, shape: Node) -> bool {
+    /// Whether a shape has proven ends along z that a loft between two heights feels: one that reaches farther beyond both
+    /// than the loft is high is as an outline there. An outline that turns or narrows along z has none.
+    fn ends_along_z(&self, shape: Node, heights: [Node; 2]) -> bool {
         let graph = &self.module.graph;
-        graph.uses(shape, Axis::Z) && ir::reach(graph, shape).is_some()
+        let Some(bounds) = ir::reach(graph, shape).filter(|_| graph.uses(shape, Axis::Z)) else {
+            return false;
+        };
+        let [Some(z0), Some(z1)] = heights.map(|height| self.known_value(height)) else { return true };
+        let room = z1 - z0;
+        bounds.min.z > z0 - room || bounds.max.z < z1 + room
     }
 
     /// The least of a field and that of a disc or ball, which is a tenth larger than asked for, so that the surface is

@@ -541,18 +541,21 @@ impl<'a> Lowering<'a> {
         let all = std::iter::once((String::new(), ast)).chain(files);
         let params = all.flat_map(|(qualifier, ast)| {
             ast.items.iter().filter_map(move |item| match item {
-                Item::Param(param) => Some(format!("{qualifier}{}", param.name.text)),
+                Item::Param(param) => Some((format!("{qualifier}{}", param.name.text), param.name.span)),
                 Item::Import(_) | Item::Let(_) | Item::Function(_) | Item::Solid(_) | Item::Scene(_) => None,
             })
         });
-        let declared: Vec<String> = params.collect();
+        let (declared, places): (Vec<String>, Vec<Span>) = params.unzip();
         for name in options.overrides.keys().filter(|name| !declared.contains(name)) {
-            let span = Span::new(SourceId::File, 0, 0);
             let message = format!("`{name}` is set, but the file declares no such param");
             let message = options.about_setting(name, message);
+            let near = crate::diagnostic::nearest(name, declared.iter().map(String::as_str));
+            let near = near.and_then(|near| Some((near, places[declared.iter().position(|d| d == near)?])));
+            // where none has such a name, the message is about no place of the file
+            let span = near.map_or(Span::new(SourceId::File, 0, 0), |(_, place)| place);
             let mut diagnostic = Diagnostic::error(Code::OVERRIDE, span, message);
-            diagnostic = match crate::diagnostic::nearest(name, declared.iter().map(String::as_str)) {
-                Some(near) => diagnostic.help(format!("did you mean `{near}`?")),
+            diagnostic = match near {
+                Some((near, _)) => diagnostic.at("declared here").help(format!("did you mean `{near}`?")),
                 None if vocabulary::is_key(name) => {
                     let set = options.setting_of_new_param(name);
                     diagnostic.help(format!(
@@ -562,7 +565,8 @@ impl<'a> Lowering<'a> {
                 None if declared.is_empty() => diagnostic.help("the file declares no params"),
                 None => diagnostic.help(format!("declared params: {}", declared.join(", "))),
             };
-            self.report(diagnostic);
+            // two names may be near to the same param
+            self.diagnostics.push(diagnostic);
         }
     }
 }

@@ -7,7 +7,9 @@ use rayon::prelude::*;
 use rustc_hash::{FxHashMap, FxHashSet};
 
 use super::normals::gradients;
-use super::{Grid, GridError, Mesh, MeshError, Resolution, Stretch, Watch, dual_contouring, shells};
+use super::{
+    ByLines, Grid, GridError, Mesh, MeshError, Resolution, Stretch, ThinCells, Watch, dual_contouring, shells,
+};
 use crate::field::Field;
 use crate::geom::Aabb;
 
@@ -28,6 +30,39 @@ pub struct Volume {
     pub solids: usize,
     /// The number of separate solids in the coarser mesh. If the two numbers differ, neither is certain.
     pub solids_coarser: usize,
+}
+
+/// The part of the volume from which on its error tells of a part that coarser meshes have missed: of plates as thin as
+/// their cells, errors were a tenth of the volume and more.
+const MISSED_PART: f64 = 0.05;
+
+impl Volume {
+    /// Whether the meshes show all parts of the solid, of which `thin` were found in the cells of the finest one; `None`
+    /// where that is not known.
+    pub fn shows_all(&self, thin: Option<&ThinCells>) -> Option<bool> {
+        let agree = self.solids == self.solids_coarser;
+        // what is left out at the edge of a wedge is within the errors
+        let no_thin_parts = thin.is_some_and(|thin| thin.count == 0 || thin.is_wedge);
+        let is_known = !agree || !no_thin_parts || thin.is_some_and(|thin| !thin.ended);
+        is_known.then_some(agree && no_thin_parts)
+    }
+
+    /// Whether the coarser of the meshes are so far off that they must have missed a part.
+    pub fn is_uncertain(&self) -> bool {
+        self.error > MISSED_PART * self.volume.abs()
+    }
+
+    /// Whether lines have found the same volume, within the errors of both.
+    pub fn agrees_with(&self, lines: &ByLines) -> bool {
+        (self.volume - lines.volume).abs() <= self.error + lines.error
+    }
+
+    /// The same with errors as large as those of the lines: what they do not meet, meshes may not show either.
+    #[must_use]
+    pub fn trusted_no_more_than(self, lines: &ByLines) -> Self {
+        let (error, area_error) = (self.error.max(lines.error), self.area_error.max(lines.area_error));
+        Self { error, area_error, ..self }
+    }
 }
 
 /// Why a volume was not found.
@@ -504,6 +539,31 @@ mod tests {
         let found = shares.into_inner().unwrap();
         let most = found.iter().copied().fold(0.0, f64::max);
         assert!(most > 0.99 && most <= 1.0 && found.len() > 10, "{found:?}");
+    }
+
+    #[test]
+    fn a_volume_is_trusted_if_meshes_and_the_search_agree() {
+        let sound = Volume {
+            volume: 2.0,
+            error: 0.01,
+            area: 6.0,
+            area_error: 0.0,
+            extent: Aabb::EMPTY,
+            solids: 1,
+            solids_coarser: 1,
+        };
+        let hidden = ThinCells { count: 3, ..ThinCells::NONE };
+        let wedge = ThinCells { is_wedge: true, ..hidden };
+        let ended = ThinCells { ended: true, ..ThinCells::NONE };
+        let found = [None, Some(ThinCells::NONE), Some(wedge), Some(hidden), Some(ended)];
+        let shown = |volume: Volume| found.map(|thin| volume.shows_all(thin.as_ref()));
+        assert_eq!(shown(sound), [Some(false), Some(true), Some(true), Some(false), None]);
+        // a part that the coarser mesh lost may be lost to the finer one, too
+        assert_eq!(shown(Volume { solids_coarser: 2, ..sound }), [Some(false); 5]);
+        assert!(!sound.is_uncertain() && Volume { error: 0.2, ..sound }.is_uncertain());
+        let lines = ByLines { volume: 2.05, error: 0.05, area: 6.0, area_error: 0.1, lines: 100 };
+        assert!(sound.agrees_with(&lines) && !sound.agrees_with(&ByLines { volume: 2.1, ..lines }));
+        assert_eq!(sound.trusted_no_more_than(&lines), Volume { error: 0.05, area_error: 0.1, ..sound });
     }
 
     #[test]

@@ -106,7 +106,7 @@ impl Backdrop {
             .into_par_iter()
             .map(|k| CLEAR.map(|material| sheet(&facets, material, &canvas, k)))
             .collect();
-        let scale = unit(&camera);
+        let scale = overlay::unit(f64::from(camera.height));
         let middle = camera.look(bounds.centre()).map_or(0.0, |seen| seen.nearness);
         let pixels = camera.magnification(middle) / SUBPIXELS as f64;
         let mut backdrop = Self {
@@ -175,7 +175,7 @@ impl Backdrop {
         let mut image = self.lit(pixels, nearness, floor.as_ref(), padded, light);
         image.skipped = skipped;
         // our own digits and letters always make a caption
-        let scale = unit(&self.camera);
+        let scale = overlay::unit(f64::from(self.camera.height));
         if let Ok(caption) = overlay::caption(moment, total, scale) {
             let top = f64::from(image.height) - overlay::CAPTION_HEIGHT * scale;
             image.lay(&caption, 0, top.max(0.0) as usize);
@@ -249,7 +249,7 @@ impl Backdrop {
     }
 
     fn write_on(&self, image: &mut Image) {
-        let scale = unit(&self.camera);
+        let scale = overlay::unit(f64::from(self.camera.height));
         let (width, height) = (f64::from(image.width), f64::from(image.height));
         image.lay(&self.title, 0, 0);
         if let Some(bar) = &self.bar {
@@ -258,11 +258,6 @@ impl Backdrop {
             image.lay(bar, left.max(0.0) as usize, top.max(0.0) as usize);
         }
     }
-}
-
-/// Pixels per unit of the layout, which is made for a height of 960.
-fn unit(camera: &Camera) -> f64 {
-    f64::from(camera.height) / 960.0
 }
 
 impl Actors<'_> {
@@ -310,7 +305,7 @@ fn edges(bounds: &Aabb, camera: &Camera) -> Vec<Edge> {
         let t = (seen.nearness - farthest) / (nearest - farthest).max(f64::MIN_POSITIVE);
         mix(EDGE_FAR, EDGE_NEAR, t.clamp(0.0, 1.0))
     };
-    let thickness = EDGE_THICKNESS * unit(camera);
+    let thickness = EDGE_THICKNESS * overlay::unit(f64::from(camera.height));
     let pairs = (0..8).flat_map(|i| (0..3).map(move |bit| (i, i | 1 << bit))).filter(|(i, j)| i != j);
     pairs
         .map(|(i, j)| [corners[i], corners[j]])

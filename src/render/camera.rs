@@ -6,6 +6,7 @@
 
 use glam::{DVec2, DVec3};
 
+use super::overlay::unit;
 use super::{Cut, RenderError};
 use crate::geom::Aabb;
 
@@ -20,7 +21,7 @@ const DISTANCE: f64 = 3.0;
 /// larger one) and how finely single precision resolves it (with a smaller one).
 const PARALLEL_DISTANCE: f64 = 12.0;
 
-/// The margins around the box in a picture 960 high: left, top, right (colour bar), bottom (caption).
+/// The margins around the box in units of the layout: left, top, right (colour bar), bottom (caption).
 const MARGINS: [f64; 4] = [48.0, 56.0, 150.0, 72.0];
 
 /// How lines that are parallel in space are drawn.
@@ -136,7 +137,7 @@ impl Camera {
     /// The corners of the part of the picture within the margins, in sub-pixels.
     fn room(&self) -> (DVec2, DVec2) {
         let page = SUBPIXELS as f64 * DVec2::new(f64::from(self.width), f64::from(self.height));
-        let [left, top, right, bottom] = MARGINS.map(|m| m * page.y / 960.0);
+        let [left, top, right, bottom] = MARGINS.map(|m| m * SUBPIXELS as f64 * unit(f64::from(self.height)));
         let low = DVec2::new(left, top);
         (low, low + (page - DVec2::new(left + right, top + bottom)).max(0.25 * page))
     }

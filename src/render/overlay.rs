@@ -71,6 +71,15 @@ const INK: &str = "#1c1c1c";
 const HALO: &str =
     r##"paint-order="stroke" stroke="#fff" stroke-opacity=".85" stroke-width="5" stroke-linejoin="round""##;
 
+/// Least pixels per unit at which the smallest letters can be read.
+const READABLE: f64 = 0.5;
+
+/// Pixels per unit of the layout, which is made for a height of 960, in a picture of this height. In a small one letters
+/// stay as large as can be read, as long as there is room for the colour bar.
+pub(super) fn unit(height: f64) -> f64 {
+    (height / 960.0).max(READABLE.min(height / BAR_HEIGHT))
+}
+
 /// Draws an SVG body on a page of `size` units, at `scale` pixels per unit.
 fn draw(size: (f64, f64), scale: f64, body: &str) -> Result<Layer, RenderError> {
     let svg = format!(
@@ -268,6 +277,15 @@ mod tests {
         assert_eq!(marks(-2e-9, -2e-9), "-2e-9");
         assert_eq!(marks(0.0, 2.0), "0.0 0.5 1.0 1.5 2.0");
         assert_eq!(marks(f64::NAN, f64::NAN) + &marks(1.0, f64::INFINITY) + &marks(1.0, 0.0), "");
+    }
+
+    #[test]
+    fn letters_of_small_pictures_can_be_read() {
+        let smallest = |height: f64| 16.0 * unit(height);
+        assert_eq!([480.0, 960.0, 1920.0].map(unit), [0.5, 1.0, 2.0]);
+        assert!([200.0, 240.0, 300.0].map(smallest).into_iter().all(|pixels| pixels > 7.0));
+        // and its bar fits a picture of any height
+        assert!([20.0, 100.0, 200.0, 400.0].into_iter().all(|height| BAR_HEIGHT * unit(height) <= height));
     }
 
     #[test]

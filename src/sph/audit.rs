@@ -511,9 +511,15 @@ impl Audit {
             let derived = if parameters.states_sound_speed() { "" } else { " derived" };
             let wanted = format!("{:.1e}", 10.0 * self.max_speed);
             let wanted: f64 = wanted.parse().unwrap_or(10.0 * self.max_speed);
+            // one that is too low for what was foreseen is the cause of what was not
+            let stated = parameters.stated_sound();
+            let advice = match stated.is_some_and(|stated| stated.sound_speed < 10.0 * stated.driven_speed) {
+                true => "leave `sound_speed` out".to_string(),
+                false => format!("state `sound_speed: {wanted} m/s`"),
+            };
             format!(
                 "the fluid reached {speed} m/s, with a{derived} speed of sound of {sound} m/s: there it is a gas, and its \
-                 forces are not those of a liquid; state `sound_speed: {wanted} m/s`"
+                 forces are not those of a liquid; {advice}"
             )
         })
     }

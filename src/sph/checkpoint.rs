@@ -104,6 +104,11 @@ impl Checkpoint {
         found.map(|(_, values)| &values[..]).ok_or_else(|| CheckpointError::Column(name.to_string()))
     }
 
+    /// All names, each with its numbers.
+    pub fn columns(&self) -> impl Iterator<Item = (&str, &[f64])> {
+        self.columns.iter().map(|(name, values)| (&**name, &**values))
+    }
+
     /// The numbers with a name, one for each particle.
     pub(super) fn of_particles(&self, name: &str) -> Result<Vec<f64>, CheckpointError> {
         let values = self.get(name)?;

@@ -363,6 +363,23 @@ fn an_experiment_tells_of_obstacles_that_its_particles_do_not_fit() {
     }
 }
 
+#[test]
+fn a_vessel_that_is_an_obstacle_is_asked_about() {
+    let scene = |vessel: &str, shape: &str| {
+        let text = format!(
+            "rfm 1\nsolid bowl = sphere(0.5)\nsolid post = sphere(0.1)\nscene s {{\nbox {{ min: [-1, -1, -1], max: [1, 1, 1] }}\n\
+             fluid {{ shape: {shape}, particles: 500 }}\nobstacle {{ solid: post }}\n{vessel} {{ solid: bowl }}\n}}\n"
+        );
+        rfm_reading(root(), &["run", "-", "--dry-run"], text.as_bytes()).stderr
+    };
+    let told = scene("obstacle", "bowl and z <= 0");
+    assert!(
+        told.contains("if `bowl` is the vessel that holds the fluid, it is no `obstacle`, but a `container`"),
+        "{told}"
+    );
+    assert!(!scene("container", "bowl and z <= 0").contains("E0502"));
+}
+
 /// Each of many obstacles would have a map of the box, but whether the fluid has room is told all the same.
 #[test]
 fn the_room_among_many_obstacles_is_looked_at() {
@@ -450,10 +467,16 @@ fn only_lofts_of_solids_are_asked_about() {
         "square.taper(1, 0.5)",
         "text(\"R\", 1)",
         "(x^2 + y^2 <= 1 + 0.1*sin(z))",
+        "box([0, 0, -1.5], [1, 1, 2.5])",
     ] {
         assert!(!told(outline), "{outline}");
     }
-    for solid in ["sphere(1)", "square.extrude(0, 1)", "box([0, 0, 0.2], [1, 1, 0.8])"] {
+    for solid in [
+        "sphere(1)",
+        "square.extrude(0, 1)",
+        "box([0, 0, 0.2], [1, 1, 0.8])",
+        "box([0, 0, -1.5], [1, 1, 1.5])",
+    ] {
         assert!(told(solid), "{solid}");
     }
 }

@@ -60,6 +60,7 @@ fn a_sweep_of_check_has_the_volumes_of_balls() {
     // a panel for volume and one for area: the number of components does not change
     let plot = std::fs::read_to_string(folder.path().join("a.sweep/plot.svg")).unwrap();
     assert_eq!(plot.matches("<polyline").count(), 2);
+    assert!(plot.contains(">the same at all values: components 1<"), "{plot}");
     assert_eq!(plot.matches("<svg").count(), plot.matches("</svg>").count());
     let picture = std::fs::File::open(folder.path().join("a.sweep/plot.png")).unwrap();
     let picture = png::Decoder::new(std::io::BufReader::new(picture)).read_info().unwrap();

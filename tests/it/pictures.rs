@@ -126,6 +126,39 @@ scene drop {
 }
 
 #[test]
+fn flags_for_pictures_that_are_not_drawn_are_told_of() {
+    let folder = tempfile::tempdir().unwrap();
+    let text = "rfm 1\nscene s {\n  box { max: [1, 1, 1] }\n  fluid { shape: ball([0.5, 0.5, 0.5], 0.2), spacing: 0.1 }
+  run { until: 1 ms, save_every: 1 ms }\n}\n";
+    std::fs::write(folder.path().join("ball.rfm"), text).unwrap();
+    let run = |flags: &[&str]| {
+        let arguments = [&["run", "ball.rfm", "--steps", "1", "--force"], flags].concat();
+        rfm(folder.path(), &arguments).expect(0).stderr
+    };
+    let told = run(&["--no-pictures", "--camera", "1,1,1"]);
+    assert!(told.contains("--camera is of no effect: with --no-pictures there are no pictures"), "{told}");
+    let told = run(&["--no-frames", "--cut", "none", "--surface"]);
+    assert!(told.contains("--cut, --surface are of no effect: with --no-frames"), "{told}");
+    assert!(!run(&["--no-pictures"]).contains("no effect"));
+}
+
+#[test]
+fn a_plane_within_a_small_face_is_told_of() {
+    let folder = tempfile::tempdir().unwrap();
+    let text = "rfm 1\nsolid plate = box([0, 0, 0], [1, 1, 0.2]) \\ box([0.4, 0.4, 0.1], [0.45, 0.45, 1])
+solid roof = polygon([[0, 0], [1, 0], [0.5, 0.5]]).extrude(0, 1).rotate_x(90 deg)\n";
+    std::fs::write(folder.path().join("plate.rfm"), text).unwrap();
+    let check = |solid: &str, plane: &str| {
+        let arguments = ["check", "plate.rfm", "-s", solid, "--slice", plane, "-o", "s.svg"];
+        rfm(folder.path(), &arguments).expect(0).stderr
+    };
+    assert!(check("plate", "z=0.1").contains("W0414"));
+    assert!(check("plate", "z=0.11").is_empty());
+    // a line is no face
+    assert!(!check("roof", "z=0.5").contains("W0414"));
+}
+
+#[test]
 #[ignore = "long"]
 fn a_plane_within_a_face_shows_what_lies_outside_of_it() {
     let folder = tempfile::tempdir().unwrap();

@@ -20,10 +20,6 @@ const REFINED: usize = 3;
 /// Cells by which a mesh may fall short of the bounds of its solid: tips and sharp rims are cut off.
 const HIDDEN_CELLS: f64 = 2.0;
 
-/// The part of the volume from which on its error tells of a part that coarser meshes have missed: of plates as thin as
-/// their cells, errors were a tenth of the volume and more.
-const MISSED_PART: f64 = 0.05;
-
 /// The share of the work that is done when the volume is known.
 const MESHES: f64 = 0.5;
 
@@ -77,32 +73,43 @@ pub(super) fn measure(
     let meshing = Stretch { watch, from: 0.0, to: MESHES };
     let searching = Stretch { watch, from: MESHES, to: 1.0 };
     let by_meshes = by_meshes(&*surface, bounds, &meshing, &mut facts)?;
-    if by_meshes == ByMeshes::Impossible {
-        return Ok((facts, ThinCells::NONE));
-    }
+    let (mut found, shows_nothing) = match by_meshes {
+        ByMeshes::Measured(found) => (Some(found), false),
+        ByMeshes::Ended => (None, false),
+        ByMeshes::ShowNothing => (None, true),
+        ByMeshes::Impossible => return Ok((facts, ThinCells::NONE)),
+    };
     let by_lines = || mesh::by_lines(&*surface, bounds, watch);
     // the search for thin parts follows slopes, of which a choice has none, and takes the longer for it
     let of_choices = (solid.may_choose() && knows_ranges(solid, grid.bounds())).then(by_lines).flatten();
     let thin = thin_cells(solid, &*surface, &grid, &searching, notes);
     tell_of_end(solid, thin, &mut facts, notes);
-    facts.resolved = resolved(thin, &facts);
+    facts.resolved = found.and_then(|found| found.shows_all(thin.as_ref()));
     // of a plate that lies between the nodes nothing is seen, but the search may have found it
-    let is_hidden =
-        by_meshes == ByMeshes::ShowNothing && thin.is_some_and(|thin| thin.count > 0 && !thin.ended);
+    let is_hidden = shows_nothing && thin.is_some_and(|thin| thin.count > 0 && !thin.ended);
     // a sheet or a wire, of which cells show little or nothing, is crossed by lines
     let hides_parts = facts.resolved != Some(true) && thin.is_some_and(|thin| thin.count > 0);
-    let shows_nothing = by_meshes == ByMeshes::ShowNothing && thin.is_some();
+    let shows_nothing = shows_nothing && thin.is_some();
     let lines = of_choices.or_else(|| (hides_parts || shows_nothing).then(by_lines).flatten());
-    match &lines {
-        Some(found) if hides_parts || !agree(found, &facts) => take_by_lines(found, bounds, &mut facts),
-        Some(found) => trust_no_more_than(found, &mut facts),
-        None => {}
+    match (&lines, found) {
+        (Some(lines), Some(by_meshes)) if !hides_parts && by_meshes.agrees_with(lines) => {
+            let trusted = by_meshes.trusted_no_more_than(lines);
+            (facts.volume_error, facts.area_error) = (Some(trusted.error), Some(trusted.area_error));
+            found = Some(trusted);
+        }
+        (Some(lines), _) => {
+            take_by_lines(lines, bounds, &mut facts);
+            found = None;
+        }
+        (None, _) => {}
     }
-    let misses_parts = facts.resolved == Some(true) && is_uncertain(&facts);
+    let misses_parts = facts.resolved == Some(true) && found.is_some_and(|found| found.is_uncertain());
     if let Some(thin) = thin.filter(|_| facts.resolved == Some(false) || is_hidden || misses_parts) {
-        refine((solid, &*surface, bounds), (&grid, thin), lines.as_ref(), watch, (&mut facts, notes));
+        let finer =
+            refine((solid, &*surface, bounds), (&grid, thin), lines.as_ref(), watch, (&mut facts, notes));
+        found = finer.or(found);
     }
-    if facts.resolved == Some(true) && is_uncertain(&facts) {
+    if facts.resolved == Some(true) && found.is_some_and(|found| found.is_uncertain()) {
         facts.resolved = None;
     }
     if facts.resolved == Some(false) && facts.lines.is_none() {
@@ -113,20 +120,6 @@ pub(super) fn measure(
     facts.shows_nothing =
         shows_nothing && lines.is_none() && thin.is_some_and(|thin| thin.count == 0 && !thin.ended);
     Ok((facts, thin.unwrap_or(ThinCells::NONE)))
-}
-
-/// Whether the coarser of the meshes are so far off that they must have missed a part.
-fn is_uncertain(facts: &Facts) -> bool {
-    facts.volume.zip(facts.volume_error).is_some_and(|(volume, error)| error > MISSED_PART * volume.abs())
-}
-
-/// Whether the meshes show all parts; `None` where that is not known.
-fn resolved(thin: Option<ThinCells>, facts: &Facts) -> Option<bool> {
-    let (solids, coarser) = (facts.components?, facts.components_coarser?);
-    // what is left out at the edge of a wedge is within the errors
-    let no_thin_parts = thin.is_some_and(|thin| thin.count == 0 || thin.is_wedge);
-    let is_known = solids != coarser || !no_thin_parts || thin.is_some_and(|thin| !thin.ended);
-    is_known.then_some(solids == coarser && no_thin_parts)
 }
 
 /// Says that there was no time for the meshes.
@@ -152,10 +145,12 @@ fn of_nothing(facts: Facts) -> Facts {
 }
 
 /// What came of the meshes that show the volume.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 enum ByMeshes {
-    /// The volume, or a part of the work until it was ended.
-    Measured,
+    /// The volume.
+    Measured(Volume),
+    /// A part of the work, until it was ended.
+    Ended,
     /// No part of the solid.
     ShowNothing,
     /// The solid cannot be meshed.
@@ -170,27 +165,30 @@ fn by_meshes(
     facts: &mut Facts,
 ) -> Result<ByMeshes, Failure> {
     match mesh::volume(surface, bounds, VOLUME_CELLS, watch) {
-        Ok(found) => take(&found, bounds, VOLUME_CELLS, facts),
+        Ok(found) => {
+            take(&found, bounds, VOLUME_CELLS, facts);
+            Ok(ByMeshes::Measured(found))
+        }
         Err(VolumeError::TooThin) => {
             let why = format!("it is empty, or too thin for {VOLUME_CELLS} cells along its longest side");
             facts.no_volume = Some(why + &uneven_sides(bounds).unwrap_or_default());
             // nothing shows how far it reaches
             facts.are_loose = true;
-            return Ok(ByMeshes::ShowNothing);
+            Ok(ByMeshes::ShowNothing)
         }
-        Err(error @ VolumeError::TooFewCells(_)) => return Err(Failure::usage(error)),
-        Err(VolumeError::Grid(error)) => return Err(Failure::usage(error)),
+        Err(error @ VolumeError::TooFewCells(_)) => Err(Failure::usage(error)),
+        Err(VolumeError::Grid(error)) => Err(Failure::usage(error)),
         Err(VolumeError::Mesh(MeshError::Ended)) => {
             ended_before_meshes(facts);
+            Ok(ByMeshes::Ended)
         }
         Err(VolumeError::Mesh(
             error @ (MeshError::NotANumber { .. } | MeshError::TooManyVertices { .. }),
         )) => {
             facts.no_volume = Some(error.to_string());
-            return Ok(ByMeshes::Impossible);
+            Ok(ByMeshes::Impossible)
         }
     }
-    Ok(ByMeshes::Measured)
 }
 
 /// What there is to ask of bounds with a side that is far longer than another, as in
@@ -237,21 +235,6 @@ fn take_by_lines(found: &ByLines, bounds: &Aabb, facts: &mut Facts) {
     facts.uneven_sides = uneven_sides(bounds);
 }
 
-/// Whether the volume of meshes is that of the lines, within the errors of both.
-fn agree(found: &ByLines, facts: &Facts) -> bool {
-    facts.volume.zip(facts.volume_error).is_some_and(|(volume, error)| confirms(found, volume, error))
-}
-
-fn confirms(lines: &ByLines, volume: f64, error: f64) -> bool {
-    (volume - lines.volume).abs() <= error + lines.error
-}
-
-/// Makes errors as large as those of the lines: what they do not meet, meshes may not show either.
-fn trust_no_more_than(found: &ByLines, facts: &mut Facts) {
-    facts.volume_error = facts.volume_error.map(|error| error.max(found.error));
-    facts.area_error = facts.area_error.map(|error| error.max(found.area_error));
-}
-
 /// The figures of a solid whose surface is a list of triangles.
 fn exact(mesh: &Mesh, facts: &mut Facts) {
     let shells = mesh::shells(mesh);
@@ -284,20 +267,20 @@ fn tell_of_end(solid: &Solid, thin: Option<ThinCells>, facts: &mut Facts, notes:
 }
 
 /// Measures a solid again with the cells that its thin parts need. If these show all of it, and lines do not
-/// contradict them, their figures are taken.
+/// contradict them, their figures are taken, and returned.
 fn refine(
     (solid, surface, bounds): (&Solid, &dyn Field, &Aabb),
     (grid, thin): (&Grid, ThinCells),
     lines: Option<&ByLines>,
     watch: &dyn Watch,
     (facts, notes): (&mut Facts, &mut Vec<String>),
-) {
+) -> Option<Volume> {
     // what hides in no cell of the usual grid may still hide in the coarser one, of half as many
     let mut needed = if thin.count == 0 { Some(2 * VOLUME_CELLS) } else { thin.cells_needed(grid) };
     for _ in 0..REFINED {
         let can_be_had = |&cells: &usize| cells > VOLUME_CELLS && on_faces(bounds, cells) <= MOST_ON_FACES;
-        let Some(cells) = needed.filter(can_be_had) else { return };
-        let Ok(grid) = Grid::around(bounds, Resolution::Cells(cells)) else { return };
+        let cells = needed.filter(can_be_had)?;
+        let Ok(grid) = Grid::around(bounds, Resolution::Cells(cells)) else { return None };
         let no_time = format!(
             "there was no time to measure `{}` with the {cells} cells that show its thin parts; --budget gives it more",
             solid.name()
@@ -306,10 +289,11 @@ fn refine(
             Ok(thin) if !thin.ended => thin,
             Ok(_) => {
                 facts.wants_time = true;
-                return notes.push(no_time);
+                notes.push(no_time);
+                return None;
             }
             // its volume has reported it
-            Err(_) => return,
+            Err(_) => return None,
         };
         if thin.count > 0 && !thin.is_wedge {
             // where it is thinnest elsewhere, or in steps where the same place needs a little more
@@ -319,11 +303,12 @@ fn refine(
         match mesh::volume(surface, bounds, cells, watch) {
             Ok(found)
                 if found.solids == found.solids_coarser
-                    && lines.is_none_or(|lines| confirms(lines, found.volume, found.error)) =>
+                    && lines.is_none_or(|lines| found.agrees_with(lines)) =>
             {
                 take(&found, bounds, cells, facts);
                 facts.resolved = Some(true);
                 facts.uneven_sides = uneven_sides(bounds);
+                return Some(found);
             }
             Err(VolumeError::Mesh(MeshError::Ended)) => {
                 facts.wants_time = true;
@@ -332,8 +317,9 @@ fn refine(
             // the figures of the usual cells, or of lines, stay
             Ok(_) | Err(_) => {}
         }
-        return;
+        return None;
     }
+    None
 }
 
 /// How many cells three faces of some bounds have, with so many along the longest side.

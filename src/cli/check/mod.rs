@@ -37,6 +37,9 @@ struct Document {
 /// The share of the work that is done when all solids are measured; then slips in their formulas are looked for.
 const MEASURED: f64 = 0.8;
 
+/// The share that is done when those are measured again that had too little time.
+const MEASURED_AGAIN: f64 = 0.95;
+
 /// Seconds for each operation of a solid of many leaves: of ten thousand parts a minute was seen.
 const SECONDS_BY_LEAVES: f64 = 8e-5;
 
@@ -215,14 +218,18 @@ fn solids(
     }
     // what the others have left is for those whose share was too small; of too many solids nothing is left
     let mut unfinished = tried.iter().filter(|tried| tried.is_unfinished()).count();
+    let (longer, mut done) = (unfinished, MEASURED);
     for tried in tried.iter_mut().filter(|tried| are_all && tried.is_unfinished()) {
-        tried.again(file, share(budget - start.elapsed().as_secs_f64(), unfinished, 0.0), &forwards)?;
+        let from = done;
+        done += (MEASURED_AGAIN - MEASURED) / longer as f64;
+        let watch = Stretch { watch: &forwards, from, to: done };
+        tried.again(file, share(budget - start.elapsed().as_secs_f64(), unfinished, 0.0), &watch)?;
         unfinished -= 1;
     }
     let (mut facts, mut searches) = (Vec::new(), lints::Searches::new());
     let measured = tried.len();
     for (number, tried) in tried.into_iter().enumerate() {
-        forwards.progress(MEASURED + (1.0 - MEASURED) * number as f64 / measured as f64);
+        forwards.progress(done + (1.0 - done) * number as f64 / measured as f64);
         bar.suspend(|| tried.notes.iter().for_each(note));
         facts.push(conclude(program, tried, &mut searches, diagnostics));
     }

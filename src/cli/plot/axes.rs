@@ -2,7 +2,7 @@
 
 use std::fmt::Write;
 
-use super::{BOTTOM, HEIGHT, LEFT, RIGHT, SECOND_AXIS, TOP, WIDTH};
+use super::{BOTTOM, HEIGHT, LEFT, SECOND_AXIS, TOP};
 
 /// If an axis covers at most this many powers of ten there is room for lines between them.
 const FEW: f64 = 3.0;
@@ -233,7 +233,7 @@ pub(in crate::cli) fn grid(out: &mut String, x: &dyn Axis, y: &dyn Axis, names: 
     for (value, text) in y.ticks() {
         along(out, y.at(value), &text, right);
     }
-    axis_names(out, names);
+    axis_names(out, names, right);
 }
 
 /// Draws the numbers and the name of a second axis to the right of the plot, which ends at x = `right`.
@@ -275,12 +275,12 @@ fn along(out: &mut String, at: f64, text: &str, right: f64) {
     );
 }
 
-fn axis_names(out: &mut String, [along, up]: [&str; 2]) {
+fn axis_names(out: &mut String, [along, up]: [&str; 2], right: f64) {
     let middle = 0.5 * (TOP + HEIGHT - BOTTOM);
     let _ = write!(
         out,
         r##"<text x="{:.1}" y="{:.1}" text-anchor="middle">{along}</text><text x="20" y="{middle:.1}" text-anchor="middle" transform="rotate(-90 20 {middle:.1})">{up}</text>"##,
-        0.5 * (LEFT + WIDTH - RIGHT),
+        0.5 * (LEFT + right),
         HEIGHT - 14.0
     );
 }

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 
 use super::super::{Failure, note, output};
 use crate::cli::output::Shown;
-use rfm::experiment::Every;
+use rfm::experiment::{Every, SceneMark};
 use rfm::lower::Scene;
 use rfm::sph::{Checkpoint, CheckpointError, Simulation};
 
@@ -17,7 +17,7 @@ const FOLDER: &str = "checkpoints";
 
 pub(super) struct Checkpoints {
     folder: PathBuf,
-    fingerprint: [u8; 32],
+    mark: SceneMark,
     /// Times of checkpoints; `None`: one is saved with every frame.
     every: Option<Every>,
     /// Step numbers of the checkpoints in the folder, oldest first.
@@ -25,18 +25,13 @@ pub(super) struct Checkpoints {
 }
 
 impl Checkpoints {
-    pub fn new(
-        run_folder: &Path,
-        fingerprint: [u8; 32],
-        scene: &Scene,
-        resumed: Option<&Checkpoint>,
-    ) -> Self {
+    pub fn new(run_folder: &Path, mark: SceneMark, scene: &Scene, resumed: Option<&Checkpoint>) -> Self {
         let folder = run_folder.join(FOLDER);
         let time = resumed.map_or(0.0, |checkpoint| checkpoint.time);
         let every = scene.run.checkpoint_every.map(|period| Every::after(period, time));
         let upto = resumed.map_or(0, |checkpoint| checkpoint.steps);
         let steps = list(&folder).into_iter().filter(|steps| *steps <= upto && resumed.is_some()).collect();
-        Self { folder, fingerprint, every, steps }
+        Self { folder, mark, every, steps }
     }
 
     /// Whether a checkpoint is to be written at this instant; `with_frame`: a frame has been saved at it.
@@ -53,7 +48,7 @@ impl Checkpoints {
         std::fs::create_dir_all(&self.folder)
             .map_err(|e| Failure::usage(format!("cannot make the folder `{}`: {e}", self.folder.shown())))?;
         let mut checkpoint = simulation.checkpoint();
-        checkpoint.fingerprint = self.fingerprint;
+        self.mark.stamp(&mut checkpoint);
         more(&mut checkpoint);
         let steps = checkpoint.steps;
         output::write(&path(&self.folder, steps), |mut out| checkpoint.write(&mut out))?;
@@ -76,26 +71,18 @@ impl Checkpoints {
 ///
 /// # Errors
 /// There is no checkpoint, or it is not one of this scene. `read` are the files that the scene's file names.
-pub(super) fn latest(
-    run_folder: &Path,
-    fingerprint: &[u8; 32],
-    read: &[String],
-) -> Result<Checkpoint, Failure> {
+pub(super) fn latest(run_folder: &Path, mark: &SceneMark, read: &[String]) -> Result<Checkpoint, Failure> {
     let folder = run_folder.join(FOLDER);
     let mut faults = Vec::new();
     for steps in list(&folder).into_iter().rev() {
         let path = path(&folder, steps);
         match sound(&path) {
-            Ok(checkpoint) if checkpoint.fingerprint != *fingerprint => {
-                // one number stands for the scene and all that it reads
-                let files = match read {
-                    [] => String::new(),
-                    files => format!(", or a file that it reads ({}),", listed(files)),
-                };
+            Ok(checkpoint) if !mark.fits(&checkpoint) => {
                 return Err(Failure::usage(format!(
-                    "cannot go on from `{}`: it belongs to another scene, or this scene{files} has changed since; only the \
-                     `run` block and probes may change (with --force instead of --resume the run begins anew)",
-                    path.shown()
+                    "cannot go on from `{}`: {}; only the `run` block and probes may change (with --force instead of \
+                     --resume the run begins anew)",
+                    path.shown(),
+                    what_changed(mark, &checkpoint, read)
                 )));
             }
             Ok(checkpoint) => {
@@ -114,6 +101,20 @@ pub(super) fn latest(
     faults
         .push("there is nothing else to go on from: --force in place of --resume begins the run anew".into());
     Err(Failure::usage(faults.join("\n")))
+}
+
+/// Why a checkpoint does not belong to the scene that has this mark, and reads these files.
+fn what_changed(mark: &SceneMark, checkpoint: &Checkpoint, read: &[String]) -> String {
+    // a part of the scene may come from a file
+    let files = match read {
+        [] => String::new(),
+        files => format!(", or a file that it reads ({}),", listed(files)),
+    };
+    let differences = match &mark.differences(checkpoint)[..] {
+        [] => String::new(),
+        found => format!(": {}", found.join(", ")),
+    };
+    format!("it belongs to another scene, or this scene{files} has changed since{differences}")
 }
 
 /// Whether a folder has a checkpoint.

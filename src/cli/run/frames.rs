@@ -6,7 +6,7 @@
 use std::path::{Path, PathBuf};
 
 use super::super::args::Run;
-use super::super::failure::warn;
+use super::super::failure::{note, warn};
 use super::super::stopwatch::Stopwatch;
 use super::super::{Failure, output};
 use super::bodies::Bodies;
@@ -59,6 +59,31 @@ struct Saved {
     is_lost: bool,
 }
 
+/// Says that flags for pictures change nothing where there are none.
+fn tell_of_idle_flags(options: &Run) {
+    let flags = [
+        ("--camera", options.camera.is_some()),
+        ("--cut", options.cut.is_some()),
+        ("--hide", !options.hide.is_empty()),
+        ("--glass", !options.glass.is_empty()),
+        ("--surface", options.surface.is_some()),
+    ];
+    let given: Vec<&str> =
+        flags.into_iter().filter_map(|(flag, is_given)| is_given.then_some(flag)).collect();
+    if !given.is_empty() {
+        let why = if options.no_pictures { "--no-pictures" } else { "--no-frames" };
+        note(format!("{} of no effect: with {why} there are no pictures", of_flags(&given)));
+    }
+}
+
+/// Flags as the subject of a sentence.
+fn of_flags(flags: &[&str]) -> String {
+    match flags {
+        [one] => format!("{one} is"),
+        several => format!("{} are", several.join(", ")),
+    }
+}
+
 impl Frames {
     /// Prepares the folder of a run that begins, or that goes on from a checkpoint.
     pub fn new(
@@ -74,6 +99,7 @@ impl Frames {
         let pictures = if write_frames && !options.no_pictures {
             Some(Pictures::new(Look::of(options), experiment, &meshes)?)
         } else {
+            tell_of_idle_flags(options);
             None
         };
         create(&folder)?;

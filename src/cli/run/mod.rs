@@ -48,10 +48,10 @@ pub(super) fn run(shared: &Shared, options: &Run) -> Result<(), Failure> {
     let scene = choose::scene(&program, options.scene.as_deref())?;
     obstacles_fit(options, scene)?;
     let experiment = experiment(shared, &program, &scene.name)?;
-    let fingerprint = experiment.fingerprint();
+    let mark = experiment.mark();
     let folder = folder::of(options);
     let read = program.files().asked();
-    let latest = || options.resume.then(|| checkpoints::latest(&folder, &fingerprint, &read)).transpose();
+    let latest = || options.resume.then(|| checkpoints::latest(&folder, &mark, &read)).transpose();
     if options.dry_run {
         let goal = Goal::of(options, &experiment)?;
         frames_fit(options, goal, &experiment)?;
@@ -87,7 +87,7 @@ pub(super) fn run(shared: &Shared, options: &Run) -> Result<(), Failure> {
     let mut recording = Recording {
         frames: Frames::new(options, &experiment, resumed.as_ref())?,
         probes: Probes::start(&folder, experiment.scene(), &mut simulation, resumed.as_ref())?,
-        checkpoints: Checkpoints::new(&folder, fingerprint, experiment.scene(), resumed.as_ref()),
+        checkpoints: Checkpoints::new(&folder, mark, experiment.scene(), resumed.as_ref()),
         watch,
         experiment: &experiment,
     };

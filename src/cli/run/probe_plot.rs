@@ -10,8 +10,16 @@ use rfm::sph::Probe;
 
 const COLOURS: [&str; 6] = ["#1b6ca8", "#c05621", "#2f855a", "#6b46c1", "#b7791f", "#4a5568"];
 
-/// Dashes of lines that belong to the axis on the left, and on the right.
-const DASHES: [&str; 2] = ["none", "6 3"];
+/// Dashes of lines that belong to the axis on the right, in the order of the columns; those on the left have none.
+const DASHES: [&str; 3] = ["7 3", "2 3", "11 3 2 3"];
+
+/// The widths of lines, in the order in which they are drawn: of lines that lie on each other all are seen.
+const WIDTHS: [f64; 6] = [2.8, 2.4, 2.0, 1.7, 1.4, 1.1];
+
+/// The dashes of column `k`, which belongs to an axis.
+fn dashes(k: usize, axis: usize) -> &'static str {
+    if axis == 0 { "none" } else { DASHES[k % DASHES.len()] }
+}
 
 /// Most points of a line.
 const MOST_POINTS: usize = 2000;
@@ -86,7 +94,11 @@ pub(super) fn drawn(name: &str, probe: &Probe, table: &str, means: Option<&Means
         plot::right_axis(&mut out, second, &axis_name(&series, units[1], second), right);
     }
     let mut legend = Legend::new();
-    for (k, s) in series.iter().enumerate().filter(|(_, s)| shown(s)) {
+    let lines = series.iter().enumerate().filter(|(_, s)| shown(s)).count();
+    // a line alone, or a few of them, are as thin as the last ones
+    let widths = &WIDTHS[WIDTHS.len().saturating_sub(lines + 1)..];
+    let shown_lines = series.iter().enumerate().filter(|(_, s)| shown(s));
+    for ((k, s), width) in shown_lines.zip(widths.iter().cycle()) {
         let axis = usize::from(s.unit != units[0]);
         let mean = means.and_then(|means| means.of_column(k));
         if let Some(mean) = mean {
@@ -99,11 +111,12 @@ pub(super) fn drawn(name: &str, probe: &Probe, table: &str, means: Option<&Means
         // writing to a String cannot fail
         let _ = write!(
             out,
-            r##"<path d="{path}" fill="none" stroke="{}" stroke-width="1.6" stroke-dasharray="{}"/>"##,
-            s.colour, DASHES[axis]
+            r##"<path d="{path}" fill="none" stroke="{}" stroke-width="{width}" stroke-dasharray="{}"/>"##,
+            s.colour,
+            dashes(k, axis)
         );
         legend.entry(&mut out, &s.name, |out, x, y| {
-            plot::line_sample(out, (x, y), s.colour, DASHES[axis], false);
+            plot::line_sample(out, (x, y), s.colour, dashes(k, axis), false);
         });
         for (t, v) in lone(&times, &s.values) {
             plot::dot(&mut out, x.at(t), axes[axis].at(v), s.colour);
@@ -336,6 +349,29 @@ mod tests {
         {
             assert!(svg.contains(says), "{says}: {svg}");
         }
+    }
+
+    /// All components of a force may be zero at first, and torques follow forces.
+    #[test]
+    fn lines_that_lie_on_each_other_are_told_apart() {
+        let probe = Probe::Force { obstacle: 0, about: glam::DVec3::ZERO };
+        let svg = drawn("f", &probe, "time\n0,1,1,1,2,2,2\n1,4,4,4,8,8,8\n", None);
+        let strokes: Vec<&str> = svg
+            .split("<path d=\"")
+            .skip(1)
+            .filter_map(|path| path.split_once("stroke-width=\"")?.1.split_once("/>"))
+            .map(|(style, _)| style)
+            .collect();
+        let widths: Vec<f64> =
+            strokes.iter().filter_map(|style| style.split('"').next()?.parse().ok()).collect();
+        assert!(widths.len() == 6 && widths.is_sorted_by(|a, b| a > b), "{strokes:?}");
+        let dashes: std::collections::BTreeSet<&str> = strokes
+            .iter()
+            .skip(3)
+            .filter_map(|style| style.split_once("dasharray=\""))
+            .map(|(_, d)| d)
+            .collect();
+        assert_eq!(dashes.len(), 3, "{strokes:?}");
     }
 
     #[test]

@@ -6,13 +6,20 @@ use std::fmt::Write;
 use super::super::plot::{self, Legend};
 use super::figures::is_said_elsewhere;
 use super::index::{Index, Row};
-use rfm::slice;
+use rfm::{geom, slice};
 
 /// Maximum number of panels: the first figures are the main ones.
 const MOST_PANELS: usize = 12;
 
 /// More panels than this stand in two columns.
 const FEW_PANELS: usize = 3;
+
+/// Room to the right of a panel without a legend.
+const MARGIN: f64 = 40.0;
+
+/// The height of a line of text below the panels, and the mean width of its letters.
+const REMARK_HEIGHT: f64 = 24.0;
+const WIDTH_OF_LETTER: f64 = 6.8;
 
 /// Lines of a panel that have an entry in the legend.
 const MOST_ENTRIES: usize = 16;
@@ -33,16 +40,18 @@ pub(super) fn draw(index: &Index) -> String {
         let first = values.next();
         values.any(|value| Some(value) != first)
     };
-    let is_shown = |name: &&str| !is_said_elsewhere(name) && changes(name);
-    let mut names: Vec<&str> = index.names().into_iter().filter(is_shown).collect();
-    names.truncate(MOST_PANELS);
+    let own = index.names().into_iter().filter(|name| !is_said_elsewhere(name));
+    let (mut names, same): (Vec<&str>, Vec<&str>) = own.partition(changes);
+    let more = names.split_off(names.len().min(MOST_PANELS));
     let panels: Vec<String> = match names.is_empty() {
         true => vec![empty(index)],
         false => names.iter().map(|name| panel(index, name)).collect(),
     };
     let columns = if panels.len() > FEW_PANELS { 2 } else { 1 };
     let width = plot::WIDTH * columns as f64;
-    let height = plot::HEIGHT * panels.len().div_ceil(columns) as f64;
+    let bottom = plot::HEIGHT * panels.len().div_ceil(columns) as f64;
+    let remarks = remarks(index, &same, &more, width);
+    let height = bottom + REMARK_HEIGHT * remarks.len() as f64;
     let mut out = format!(
         r##"<svg xmlns="http://www.w3.org/2000/svg" width="{width}" height="{height}" viewBox="0 0 {width} {height}"><rect width="100%" height="100%" fill="#ffffff"/>"##
     );
@@ -51,8 +60,50 @@ pub(super) fn draw(index: &Index) -> String {
         out.push_str(&panel.replacen("<svg ", &format!("<svg x=\"{x}\" y=\"{y}\" "), 1));
         out.push_str("</svg>\n");
     }
+    for (i, remark) in remarks.iter().enumerate() {
+        let y = bottom + REMARK_HEIGHT * (i as f64 + 0.4);
+        // writing to a String cannot fail
+        let _ = writeln!(
+            out,
+            r##"<text x="{}" y="{y:.1}" font-family="Ubuntu, sans-serif" font-size="13">{}</text>"##,
+            plot::LEFT,
+            slice::escaped(remark)
+        );
+    }
     out.push_str("</svg>\n");
     out
+}
+
+/// What has no panel, in lines that fit a page: figures that are the same at all values, and those beyond the last panel.
+fn remarks(index: &Index, same: &[&str], more: &[&str], width: f64) -> Vec<String> {
+    let value = |name: &&str| {
+        let first = index.figures(name).next();
+        first.map_or_else(
+            || (*name).to_string(),
+            |figure| format!("{name} {}", geom::significant(figure.value)),
+        )
+    };
+    let same: Vec<String> = same.iter().map(value).collect();
+    let more: Vec<String> = more.iter().map(|name| (*name).to_string()).collect();
+    let letters = ((width - 2.0 * plot::LEFT) / WIDTH_OF_LETTER) as usize;
+    [("the same at all values: ", same), ("not drawn, but in table.csv: ", more)]
+        .into_iter()
+        .filter(|(_, names)| !names.is_empty())
+        .flat_map(|(what, names)| wrapped(what, &names, letters))
+        .collect()
+}
+
+/// Names behind some words, in lines of at most so many letters.
+fn wrapped(words: &str, names: &[String], letters: usize) -> Vec<String> {
+    let mut lines = vec![words.to_string()];
+    for (i, name) in names.iter().enumerate() {
+        let part = if i + 1 < names.len() { format!("{name}, ") } else { name.clone() };
+        match lines.last_mut() {
+            Some(line) if line.chars().count() + part.chars().count() <= letters => line.push_str(&part),
+            _ => lines.push(part),
+        }
+    }
+    lines
 }
 
 fn empty(index: &Index) -> String {
@@ -63,7 +114,9 @@ fn empty(index: &Index) -> String {
 
 fn panel(index: &Index, name: &str) -> String {
     let lines = lines(index, name);
-    let right = plot::WIDTH - plot::RIGHT;
+    // a line alone needs no legend, and has its room
+    let has_legend = lines.iter().any(|line| !line.name.is_empty());
+    let right = plot::WIDTH - if has_legend { plot::RIGHT } else { MARGIN };
     let points = || lines.iter().flat_map(|line| &line.points);
     let places: Vec<f64> = points().map(|point| point[0]).collect();
     let x = plot::over_params(&places, plot::LEFT, right);
@@ -108,8 +161,21 @@ fn panel(index: &Index, name: &str) -> String {
         }
     }
     if points().any(|[.., error]| *error > 0.0) {
-        legend.gap();
-        legend.remark(&mut out, &format!("bars: {}", index.kind_of_error()));
+        let bars = format!("bars: {}", index.kind_of_error());
+        match has_legend {
+            true => {
+                legend.gap();
+                legend.remark(&mut out, &bars);
+            }
+            false => {
+                let _ = write!(
+                    out,
+                    r##"<text x="{right:.1}" y="{:.1}" font-size="11" text-anchor="end">{}</text>"##,
+                    plot::HEIGHT - 0.3 * plot::BOTTOM,
+                    slice::escaped(&bars)
+                );
+            }
+        }
     }
     out
 }

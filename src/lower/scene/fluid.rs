@@ -15,6 +15,9 @@ use crate::syntax::ast::Entry;
 /// A fluid denser than this, kg/m³, is asked about: molten osmium has 20 000.
 const MOST_DENSITY: f64 = 25_000.0;
 
+/// Surface tensions above this are asked about, N/m: molten tungsten has 2.5.
+const MOST_TENSION: f64 = 5.0;
+
 /// Densities of liquids in g/cm³. A bare one of them is asked about, because it is lighter than any liquid in kg/m³.
 const IN_GRAMS: std::ops::RangeInclusive<f64> = 0.5..=25.0;
 
@@ -207,6 +210,7 @@ impl<'a> Lowering<'a> {
             |key, default| self.stated_number(block, key).map(|stated| stated.unwrap_or(default));
         let viscosity = number(&keys::VISCOSITY, defaults.viscosity);
         let tension = number(&keys::SURFACE_TENSION, defaults.surface_tension);
+        self.warn_of_tension(block, tension);
         let jitter = self.number_key(block, &keys::JITTER);
         let velocity = self.velocity(block);
         let particles = self.count_key(block, &keys::PARTICLES);
@@ -238,6 +242,16 @@ impl<'a> Lowering<'a> {
             jitter: jitter?,
             seed: seed?? as u64,
         })
+    }
+
+    /// Warns of a surface tension that no liquid has.
+    fn warn_of_tension(&mut self, block: &Block<'_>, tension: Option<f64>) {
+        let Some(tension) = tension.filter(|tension| *tension > MOST_TENSION) else { return };
+        let Some((_, value)) = block.setting(keys::SURFACE_TENSION.name) else { return };
+        let number = significant(tension);
+        let message = format!("no liquid has a surface tension of {number} N/m");
+        let help = format!("water has 0.0728 N/m, mercury 0.49 N/m: is `{number} mN/m` meant?");
+        self.report(Diagnostic::warning(Code::ODD_QUANTITY, value.span, message).help(help));
     }
 
     /// Warns of a fluid's shape or velocity that depends on the time: particles are placed once.

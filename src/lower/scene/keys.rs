@@ -22,7 +22,7 @@ const KERNEL: &str = "each method has its own kernel, which cannot be chosen; \
     how far it reaches is the `support_radius` of the fluid";
 
 /// Keys that other programs have in a block and this one does not, each with what takes its place.
-const ABSENT: [(&str, &[&str], &str); 9] = [
+const ABSENT: [(&str, &[&str], &str); 11] = [
     ("a fluid", &["kernel"], KERNEL),
     ("a solver", &["kernel"], KERNEL),
     ("a scene", &["kernel"], KERNEL),
@@ -30,6 +30,11 @@ const ABSENT: [(&str, &[&str], &str); 9] = [
         "a run",
         &["fps", "frame_rate", "framerate"],
         "the time between frames is stated: 25 in a second are `save_every: 0.04 s`",
+    ),
+    (
+        "a run",
+        &["steps", "max_steps", "n_steps", "nsteps", "num_steps", "iterations"],
+        "a run ends at a time, `until: 1 s`; `rfm run FILE --steps 100` ends it after so many steps",
     ),
     ("a fluid", &["nu", "kinematic_viscosity"], DYNAMIC),
     (
@@ -45,14 +50,19 @@ const ABSENT: [(&str, &[&str], &str); 9] = [
     (
         "a scene",
         &["inlet", "outlet", "inflow", "outflow", "source", "sink", "emitter", "periodic", "boundary"],
-        "there are no inlets, outlets and periodic boxes: begin with the fluid that is needed",
+        NO_OPENINGS,
     ),
+    ("a box", &["periodic", "boundary", "boundaries", "open", "periodicity"], NO_OPENINGS),
     (
         "a fluid",
         &["color", "colour", "material", "name"],
         "pictures colour particles by their speed; `rfm render` and `rfm view` choose otherwise",
     ),
 ];
+
+/// What is said of walls that fluid passes.
+const NO_OPENINGS: &str =
+    "there are no inlets, outlets and periodic boxes: begin with the fluid that is needed";
 
 /// Keys of the scene that are often written in one of its blocks.
 const OUTER: [&str; 3] = ["walls", "gravity", "method"];

@@ -8,7 +8,7 @@ use super::declaration::{SceneKey, declare_keys, names};
 use super::fluid::{FluidAndMethod, OF_VELOCITY};
 use super::{Block, Bounce, Container, Gravity, Obstacle, Run, Scene, Skin, Tolerance};
 use crate::diagnostic::{Code, Diagnostic, Span};
-use crate::geom::Aabb;
+use crate::geom::{Aabb, significant};
 use crate::ir::Unary;
 use crate::quantity::Dimension;
 use crate::sph::Slip;
@@ -288,10 +288,23 @@ impl<'a> Lowering<'a> {
         let nodes = self.components(value, key)?;
         let turns = nodes.iter().any(|&node| self.known_value(node).is_none());
         if !turns {
-            return self.vector_key(block, key).map(Gravity::Still);
+            let gravity = self.vector_key(block, key)?;
+            self.warn_of_other_gravity(gravity, value);
+            return Some(Gravity::Still(gravity));
         }
         let of_place = nodes.iter().any(|&node| self.depends_on_place(node));
         Some(if of_place { Gravity::Field(nodes) } else { Gravity::Turning(nodes) })
+    }
+
+    /// Warns of the gravity of the Earth in centimetres or millimetres.
+    fn warn_of_other_gravity(&mut self, gravity: DVec3, value: &Expr) {
+        const UNITS: [(&str, f64); 2] = [("cm/s^2", 981.0), ("mm/s^2", 9810.0)];
+        let is_near = |earth: f64| (gravity.length() / earth - 1.0).abs() < 0.01;
+        let Some((unit, _)) = UNITS.into_iter().find(|(_, earth)| is_near(*earth)) else { return };
+        let size = significant(gravity.length());
+        let message = format!("gravity of {size} m/s² is that of the Earth in {unit}");
+        let help = format!("that of the Earth is `[0, 0, -9.81]`, in m/s², or `[0, 0, -{size} {unit}]`");
+        self.report(Diagnostic::warning(Code::ODD_QUANTITY, value.span, message).help(help));
     }
 
     fn obstacle(

@@ -3,7 +3,7 @@
 use super::super::foreign;
 use super::super::words::{ITEM_WORDS, KEYWORDS};
 use super::Slip;
-use super::pieces::{bracketed, fits, last_number, last_word, parts, replaced, unclosed};
+use super::pieces::{bracketed, first_part, fits, last_number, last_word, parts, replaced, unclosed};
 use crate::diagnostic::{Code, Diagnostic, Span};
 
 /// What begins a fold.
@@ -59,8 +59,13 @@ impl Slip<'_> {
                 .or_else(|| self.fold_of_three())
                 .or_else(|| self.function_by_let())
                 .or_else(|| self.obstacle_by_a_shape())
+                .or_else(|| self.fluid_without_a_key())
                 .or_else(|| self.power_of_a_function()),
-            "[" => self.range_in_brackets().or_else(|| self.box_as_two_corners()),
+            "<" | ">" | "≤" | "≥" | "^" | "*" => self.fluid_without_a_key(),
+            "[" => self
+                .range_in_brackets()
+                .or_else(|| self.box_as_two_corners())
+                .or_else(|| self.box_without_a_key()),
             ":" => self
                 .type_of_a_param()
                 .or_else(|| self.value_behind_a_colon())
@@ -81,7 +86,8 @@ impl Slip<'_> {
             rest.is_some_and(|rest| rest.trim_start().starts_with(char::is_alphabetic))
         };
         let word = ITEM_WORDS.into_iter().find(is_head)?;
-        (self.in_braces() && matches!(self.found, "=" | "(")).then(|| {
+        // a block that begins on this line is not around it
+        (self.in_braces() && !line.contains('{') && matches!(self.found, "=" | "(")).then(|| {
             let start = self.at - line.len();
             let span = Span::new(self.span.source, start, start + word.len());
             Diagnostic::error(Code::SYNTAX, span, format!("`{word}` within a block"))
@@ -259,11 +265,13 @@ impl Slip<'_> {
 
     /// `box: [0, 0, 0] .. [1, 1, 1]`
     fn box_as_a_range(&self) -> Option<Diagnostic> {
-        let (key, low) = self.on_its_line().split_once(':')?;
-        let high = self.after().lines().next()?.trim_start_matches('.').trim().trim_end_matches(',');
+        let (before, low) = self.on_its_line().rsplit_once(':')?;
+        let key = last_word(before.trim_end());
+        let high = self.after().lines().next()?.trim_start_matches('.').trim();
+        let high = &high[..=high.find(']')?];
         let low = low.trim().trim_end_matches('.').trim_end();
         let are_vectors = [low, high].into_iter().all(|end| end.starts_with('[') && end.ends_with(']'));
-        let is_box = matches!(foreign::key(key.trim()).unwrap_or(key.trim()), "box");
+        let is_box = matches!(foreign::key(key).unwrap_or(key), "box");
         (is_box && are_vectors && fits(&[low, high]))
             .then(|| self.unexpected().help(format!("write `box {{ min: {low}, max: {high} }}`")))
     }
@@ -357,10 +365,33 @@ impl Slip<'_> {
     /// `obstacle { post }`
     fn block_without_a_key(&self) -> Option<Diagnostic> {
         let (head, name) = self.on_its_line().rsplit_once('{')?;
-        let (block, name) = (head.trim(), name.trim());
+        let (block, name) = (last_word(head.trim()), name.trim());
+        let block = foreign::key(block).unwrap_or(block);
         let is_name = !name.is_empty() && last_word(name) == name;
-        (["obstacle", "container"].contains(&last_word(block)) && is_name && fits(&[name]))
-            .then(|| self.unexpected().help(format!("write `{} {{ solid: {name} }}`", last_word(block))))
+        (["obstacle", "container"].contains(&block) && is_name && fits(&[name]))
+            .then(|| self.unexpected().help(format!("write `{block} {{ solid: {name} }}`")))
+    }
+
+    /// `fluid water { z <= 0.3 }`
+    fn fluid_without_a_key(&self) -> Option<Diagnostic> {
+        let (head, first) = self.on_its_line().rsplit_once('{')?;
+        let is_fluid = head.split_whitespace().rev().take(2).any(|word| word == "fluid");
+        let rest = first_part(self.text[self.at..].lines().next()?);
+        let shape = format!("{first}{}", rest.split('}').next()?);
+        let (shape, head) = (shape.trim(), head.rsplit_once("fluid")?.1.trim());
+        let name = if head.is_empty() { String::new() } else { format!("{head} ") };
+        (is_fluid && self.in_braces() && !first.contains(':') && fits(&[shape])).then(|| {
+            self.unexpected()
+                .help(format!("a value stands behind its key: write `fluid {name}{{ shape: {shape} }}`"))
+        })
+    }
+
+    /// `box [1, 1, 1]`
+    fn box_without_a_key(&self) -> Option<Diagnostic> {
+        let rest = &self.text[self.at..];
+        let corner = &rest[..=rest.find([']', '\n']).filter(|&end| rest[end..].starts_with(']'))?];
+        (last_word(self.on_its_line().trim_end()) == "box" && self.in_braces() && fits(&[corner]))
+            .then(|| self.unexpected().help(format!("write `box {{ max: {corner} }}`")))
     }
 }
 

@@ -127,10 +127,36 @@ impl Slip<'_> {
             let as_written = || (!arguments.contains('=')).then(|| format!("{function}({arguments})"));
             foreign::shape(function, &arguments).or_else(as_written)
         });
+        if let Some(prism) = self.prism_of_few_sides() {
+            return Some(self.unexpected().help(format!("{exact}; {prism}")));
+        }
         Some(self.unexpected().help(match call.filter(|call| fits(&[call]) && !call.starts_with('(')) {
             Some(call) => format!("{exact}: write `{call}`"),
             None => format!("leave it out: {exact}"),
         }))
+    }
+
+    /// `cylinder(h = 1, r = 2, $fn = 6)` is a prism, and meant as one.
+    fn prism_of_few_sides(&self) -> Option<String> {
+        let before = self.before();
+        let open = unclosed(before)?;
+        let behind = &self.text[self.at..];
+        let inner = [&before[open + 1..], &behind[..closing(behind)?]].concat();
+        let given = |name: &str| {
+            let named = parts(&inner).into_iter().filter_map(|part| part.split_once('='));
+            named.map(|(key, value)| (key.trim(), value.trim())).find(|(key, _)| *key == name).map(|(_, v)| v)
+        };
+        let sides: u32 = given("$fn")?.parse().ok().filter(|sides| (3..=12).contains(sides))?;
+        let radius = given("r").and_then(|r| r.parse().ok()).unwrap_or(1.0);
+        let inner_radius = (radius * libm::cos(std::f64::consts::PI / f64::from(sides)) * 1e4).round() / 1e4;
+        let height = given("h").unwrap_or("1");
+        let is_cylinder = last_word(&before[..open]) == "cylinder" && fits(&[height]);
+        is_cylinder.then(|| {
+            format!(
+                "a prism with {sides} sides is `(all i in 0..{sides}: half_space([1, 0, 0], [{inner_radius}, 0, 0])\
+                 .rotate_z(i*360 deg/{sides})) and 0 <= z <= {height}`"
+            )
+        })
     }
 
     /// `let f = lambda a: a^2`

@@ -84,11 +84,21 @@ impl Slip<'_> {
         let line = self.after().lines().next().unwrap_or_default();
         let head = line.trim_start().strip_prefix("in ").and_then(|rest| rest.split_once(':'));
         let range = head.and_then(|(range, _)| members(range.trim()));
-        let written = match range.filter(|range| fits(&[range.as_str()])) {
-            Some(range) => format!("any {} in {range}: …", self.found),
-            None => "any i in 0..6: …".into(),
+        let heads = match range.filter(|range| fits(&[range.as_str()])) {
+            Some(range) => format!("{} in {range}", self.found),
+            None => "i in 0..6".into(),
         };
-        self.unexpected().at("`for` is written `any` here").help(format!("write `{written}`"))
+        // `[for i in 0..5: [i, i^2]]` makes a list
+        let before = self.on_its_line().trim_end().trim_end_matches("for").trim_end();
+        match before.ends_with('[') {
+            true => self
+                .unexpected()
+                .at("`for` in a list is written `list` here")
+                .help(format!("write `list {heads}: …`, without the brackets around it")),
+            false => {
+                self.unexpected().at("`for` is written `any` here").help(format!("write `any {heads}: …`"))
+            }
+        }
     }
 
     /// `any i in 0:5: sphere(0.1).move([i, 0, 0])`

@@ -98,6 +98,7 @@ function drawLengths(context, page, look, seen) {
   if (!middle) return;
   context.fillStyle = look.colours.soft;
   context.textAlign = "center";
+  const taken = [];
   for (let axis = 0; axis < 3; axis++) {
     const [u, v] = [(axis + 1) % 3, (axis + 2) % 3];
     const edges = [];
@@ -115,13 +116,21 @@ function drawLengths(context, page, look, seen) {
     const edge = edges[0];
     if (!edge || Math.hypot(edge.p[0] - edge.q[0], edge.p[1] - edge.q[1]) < 60) continue;
     const out = unit([(edge.p[0] + edge.q[0]) / 2 - middle[0], (edge.p[1] + edge.q[1]) / 2 - middle[1], 0]);
-    const label = (p, text) => write(context, look, text, p[0] + out[0] * 17, p[1] + out[1] * 13);
     const along = (t) => [edge.p[0] + (edge.q[0] - edge.p[0]) * t, edge.p[1] + (edge.q[1] - edge.p[1]) * t];
     // what rounding has left of 0 is 0
     const rounded = (x) => (Math.abs(x) < 1e-9 * (max[axis] - min[axis]) ? 0 : x);
-    label(along(0.06), shown(rounded(min[axis])));
-    label(along(0.5), `${"xyz"[axis]}, m`);
-    label(along(0.94), shown(rounded(max[axis])));
+    // where two edges meet, a number that would touch another one stands further along its own edge
+    const label = (parts, text) => {
+      const half = context.measureText(text).width / 2 + 4;
+      const touches = ([x, y]) => taken.some((other) => Math.abs(x - other.x) < half + other.half && Math.abs(y - other.y) < 15);
+      const places = parts.map(along).map((p) => [p[0] + out[0] * 17, p[1] + out[1] * 13]);
+      const [x, y] = places.find((place) => !touches(place)) ?? places[0];
+      taken.push({ x, y, half });
+      write(context, look, text, x, y);
+    };
+    label([0.06, 0.12, 0.18, 0.24, 0.3], shown(rounded(min[axis])));
+    label([0.5], `${"xyz"[axis]}, m`);
+    label([0.94, 0.88, 0.82, 0.76, 0.7], shown(rounded(max[axis])));
   }
 }
 

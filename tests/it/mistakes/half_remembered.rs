@@ -222,3 +222,62 @@ fn an_obstacle_that_is_a_file() {
     let found = messages("scene s {\n  box { max: [1, 1, 1] }\n  obstacle = \"post.stl\"\n}").to_string();
     assert!(found.contains("write `obstacle { solid: mesh(\"post.stl\") }`"), "{found}");
 }
+
+/// The fourth argument of an arc is an angle, or the tolerance of an arc through three points.
+#[test]
+fn an_arc_through_three_points_has_a_tolerance() {
+    let told = |tolerance: &str| {
+        messages(&format!("solid s = polygon(arc([0, 0], [1, 1], [2, 0], {tolerance})).extrude(0, 1)"))
+            .to_string()
+    };
+    assert!(told("3 s").contains("a time is not a length"), "{}", told("3 s"));
+    assert!(told("10 deg").contains("an angle is not a length"), "{}", told("10 deg"));
+    let arc = messages("solid s = polygon(arc([0, 0], 1, 0, 3 s)).extrude(0, 1)").to_string();
+    assert!(arc.contains("a time is not an angle"), "{arc}");
+    let arc = messages("solid s = polygon(arc([0, 0], 1, 0, 90 deg, 3 s)).extrude(0, 1)").to_string();
+    assert!(arc.contains("a time is not a length"), "{arc}");
+}
+
+/// What people who come from other tools wrote in their first files.
+#[test]
+fn first_files_of_new_users() {
+    let scene = |inner: &str| format!("solid dam = sphere(0.2)\nscene a {{ {inner} run {{ until: 1 s }} }}");
+    let (room, pool) = ("box { max: [1, 1, 1] }", "fluid water { shape: z <= 0.3 }");
+    for (text, expected) in [
+        (scene(&format!("{room} {pool} obstacles {{ dam }}")), "write `obstacle { solid: dam }`"),
+        (scene(&format!("{room} fluid water {{ z <= 0.3 }}")), "write `fluid water { shape: z <= 0.3 }`"),
+        (
+            scene(&format!("{room} fluid {{ sphere(0.1) and z <= 0.3 }}")),
+            "`fluid { shape: sphere(0.1) and z <= 0.3 }`",
+        ),
+        (scene(&format!("box [1, 1, 1] {pool}")), "write `box { max: [1, 1, 1] }`"),
+        (
+            scene(&format!("domain: [0, 0, 0] .. [1, 1, 1], {pool}")),
+            "write `box { min: [0, 0, 0], max: [1, 1, 1] }`",
+        ),
+        (
+            scene(&format!("box {{ max: [1, 1, 1], periodic: x }} {pool}")),
+            "there are no inlets, outlets and periodic boxes",
+        ),
+        (format!("scene a {{ {room} {pool} run {{ steps: 100 }} }}"), "`rfm run FILE --steps 100`"),
+        ("solid bunny = mesh(bunny.stl)".into(), "write `\"bunny.stl\"`"),
+        ("solid a = a or sphere(1)".into(), "nothing can be made of itself"),
+        ("solid s = polygon([for i in 0..5: [i, i^2]]).extrude(0, 1)".into(), "write `list i in 0..5: …`"),
+        (
+            "solid s = polygon([[0, 0], [1, 0], [0, 1]]).extrude(h = 1)".into(),
+            "write for example `.extrude(0, 1)`",
+        ),
+        ("solid s = sphere(1).translate(x = 1, z = 2)".into(), "write `.move([1, 0, 2])`"),
+        ("solid s = abs([x, y, z]) <= 1".into(), "take its components, `v.x`"),
+    ] {
+        let found = messages(&text).to_string();
+        assert!(found.contains(expected), "{text}: {found}");
+    }
+    let found = messages("solid hex = cylinder(r = 2, h = 3, $fn = 6)").to_string();
+    let (_, prism) = found.split_once("a prism with 6 sides is `").unwrap();
+    let program = program(&format!("solid hex = {}", prism.split('`').next().unwrap())).unwrap();
+    let hex = program.solid("hex").unwrap();
+    let sign = |x: f64, y: f64| hex.sign(rfm::glam::DVec3::new(x, y, 1.5));
+    // across its sides, and across its corners
+    assert_eq!([sign(1.72, 0.0), sign(1.74, 0.0), sign(0.0, 1.99), sign(0.0, 2.01)], [1.0, -1.0, 1.0, -1.0]);
+}

@@ -4,8 +4,8 @@
  *
  * omega > 0 inside a solid, 0 on its surface, < 0 outside. Lengths are in metres, times in seconds.
  *
- * Handles are opaque. A program or a solid may be used by any number of threads at a time; it is freed once, when
- * nobody uses it any more. A solid does not need its program after it was made. Null handles are no errors of the
+ * Handles are opaque. A program, a solid or a mesh may be used by any number of threads at a time; it is freed once,
+ * when nobody uses it any more. A solid does not need its program after it was made, nor a mesh its solid. Null handles are no errors of the
  * program: questions about them give NaN or RFM_BAD_ARGUMENT, and to free them does nothing.
  *
  * Functions that may fail return RFM_OK or what went wrong. The parameter `error` may be null; otherwise it gets an
@@ -17,7 +17,7 @@
  *
  * Columns are given by a pointer to the first number and the distance between two numbers in bytes, so numbers may lie
  * in records: { &p[0].x, &p[0].y, &p[0].z, sizeof p[0] }. Results may lie in the same records as the points, or
- * replace them. Functions with columns run on the calling thread; results do not depend on how points are divided.
+ * replace them. Functions with columns run on the calling thread, but for rfm_fluid_surface; results do not depend on how points are divided.
  */
 
 #ifndef RFM_H
@@ -36,7 +36,8 @@
 typedef enum RfmStatus {
     // It did what it was asked.
     RFM_OK = 0,
-    // A pointer is null that must not be, a text is not UTF-8, or a number is out of range.
+    // A pointer is null that must not be, a text is not UTF-8, a number is out of range, or what is asked for cannot be made
+    // of what is given, as the mesh of a solid without an end.
     RFM_BAD_ARGUMENT = 1,
     // A file could not be read.
     RFM_FILE = 2,
@@ -70,6 +71,9 @@ typedef enum RfmBounds {
 
 // Why a function failed.
 typedef struct RfmError RfmError;
+
+// A closed triangle mesh. It may be used by any number of threads at a time.
+typedef struct RfmMesh RfmMesh;
 
 // A checked file.
 typedef struct RfmProgram RfmProgram;
@@ -108,6 +112,18 @@ typedef struct RfmVectors {
     // Distance between two numbers of a column, bytes.
     ptrdiff_t stride;
 } RfmVectors;
+
+// Where a path first meets a solid.
+typedef struct RfmEntry {
+    // The part of the path before the entry, 0 to 1.
+    double part;
+    // The place, m.
+    double point[3];
+    // Outward unit normal; the mean of those that meet there.
+    double normal[3];
+    // False where the path only grazes the surface within rounding errors.
+    bool certain;
+} RfmEntry;
 
 // Points as columns in single precision: the first number of each, and the distance between two, bytes.
 typedef struct RfmPointsF32 {
@@ -151,7 +167,7 @@ typedef struct RfmCollisions {
     size_t undefined;
 } RfmCollisions;
 
-// A message about a file. Its texts live as long as the error object.
+// A message about a file. Its texts live as long as the error object, or the program, that it comes from.
 typedef struct RfmDiagnostic {
     // How serious it is.
     enum RfmSeverity severity;
@@ -177,6 +193,22 @@ typedef struct RfmParam {
     double value;
 } RfmParam;
 
+// What a file says of one of its params. Its texts live as long as the program.
+typedef struct RfmParamInfo {
+    // Name of the param.
+    const char *name;
+    // Its value, in SI units.
+    double value;
+    // The least value that the file allows, in SI units; minus infinity if it states no range.
+    double low;
+    // The greatest one; infinity if the file states no range.
+    double high;
+    // The unit in which the file writes the value, such as "mm"; null if it writes none.
+    const char *unit;
+    // The text that the file has behind the param; null if it has none.
+    const char *description;
+} RfmParamInfo;
+
 // The surface as seen from a point: accurate near a face, an estimate far away. Before an edge or a corner that stands
 // out the distance is that of the nearest face's plane: too small by up to 1 - sin(a/2) of it before an edge with the
 // angle a of the solid, 29 % at a right angle, more at an acute one; and by more before a corner, 42 % at that of a box.
@@ -189,18 +221,6 @@ typedef struct RfmContact {
     // Mean curvature, 1/m, positive where the solid is convex.
     double curvature;
 } RfmContact;
-
-// Where a path first meets a solid.
-typedef struct RfmEntry {
-    // The part of the path before the entry, 0 to 1.
-    double part;
-    // The place, m.
-    double point[3];
-    // Outward unit normal; the mean of those that meet there.
-    double normal[3];
-    // False where the path only grazes the surface within rounding errors.
-    bool certain;
-} RfmEntry;
 
 #ifdef __cplusplus
 extern "C" {
@@ -240,6 +260,31 @@ enum RfmStatus rfm_contact_many(const struct RfmSolid *solid,
                                 struct RfmVectors normal,
                                 struct RfmValues curvature,
                                 struct RfmError **error);
+
+// The velocity of the surface near many points, as `rfm_wall_velocity`.
+enum RfmStatus rfm_wall_velocity_many(const struct RfmSolid *solid,
+                                      size_t count,
+                                      struct RfmPoints points,
+                                      struct RfmVectors velocity,
+                                      struct RfmError **error);
+
+// Radii of balls around many points that are proven not to meet the surface, as `rfm_clearance`. What all points need of
+// the solid is found once, so that this is faster than single points.
+enum RfmStatus rfm_clearance_many(const struct RfmSolid *solid,
+                                  size_t count,
+                                  struct RfmPoints points,
+                                  struct RfmValues clearance,
+                                  struct RfmError **error);
+
+// Where many straight paths first meet the solid, as `rfm_first_entry`. `entries` has room for `count` of them; the
+// numbers of a path that does not meet the solid are NaN, and its `certain` is true: that is proven. Of a path from or
+// to what is no place nothing is known, and its `certain` is false.
+enum RfmStatus rfm_first_entry_many(const struct RfmSolid *solid,
+                                    size_t count,
+                                    struct RfmPoints from,
+                                    struct RfmPoints to,
+                                    struct RfmEntry *entries,
+                                    struct RfmError **error);
 
 // `rfm_omega_many` in single precision throughout.
 enum RfmStatus rfm_omega_many_f32(const struct RfmSolid *solid,
@@ -394,6 +439,59 @@ double rfm_math_atan2(double a, double b);
 // The angle of the point (b, a), with the bits that solids have.
 float rfm_math_atan2f(float a, float b);
 
+// The volume of a solid, m^3, found on meshes with `cells` cells, two thirds and half as many along the longest side (96 do
+// for most solids). A solid of which parts are too thin for these is measured along lines that cross it. `uncertainty` is
+// how far it may be off, m^3, infinite if that is not known; it may be null. All processors are used.
+enum RfmStatus rfm_volume(const struct RfmSolid *solid,
+                          size_t cells,
+                          double *volume,
+                          double *uncertainty,
+                          struct RfmError **error);
+
+// A mesh of the surface of a solid, with `cells` cells along the longest side of its bounds, or of the box that is given by
+// its lowest and its highest corner, three numbers each: the mesh is closed at its border. Both may be null. Vertices lie
+// on edges and corners, too (dual contouring). All processors are used. `mesh` is null after a failure, and has no
+// triangles if the solid is empty.
+enum RfmStatus rfm_mesh(const struct RfmSolid *solid,
+                        size_t cells,
+                        const double *low,
+                        const double *high,
+                        struct RfmMesh **mesh,
+                        struct RfmError **error);
+
+// The surface of a fluid of `count` particles, each of which stands for a cube with the side `spacing`, m, as
+// `rfm render --surface` draws it. A fluid in a box, given by its lowest and its highest corner, three numbers each, goes
+// up to a wall that it touches, and never beyond it; both may be null. Particles whose places are not finite are left
+// out. `cell` is the size of a cell of the marching cubes, m; where it is 0, it is a quarter of the spacing. All
+// processors are used. `mesh` is null after a failure, and has no triangles if there are no particles.
+enum RfmStatus rfm_fluid_surface(size_t count,
+                                 struct RfmPoints particles,
+                                 double spacing,
+                                 double cell,
+                                 const double *low,
+                                 const double *high,
+                                 struct RfmMesh **mesh,
+                                 struct RfmError **error);
+
+// The number of vertices of a mesh.
+size_t rfm_mesh_vertex_count(const struct RfmMesh *mesh);
+
+// The vertices of a mesh, m: x, y and z of each after one another. They live as long as the mesh; null for null.
+const double *rfm_mesh_vertices(const struct RfmMesh *mesh);
+
+// The outward unit normals of the vertices, in the same order.
+const double *rfm_mesh_normals(const struct RfmMesh *mesh);
+
+// The number of triangles of a mesh.
+size_t rfm_mesh_triangle_count(const struct RfmMesh *mesh);
+
+// The triangles of a mesh: the numbers of three vertices each, from 0, counter-clockwise as seen from outside. They live as
+// long as the mesh; null for null.
+const uint32_t *rfm_mesh_triangles(const struct RfmMesh *mesh);
+
+// Frees a mesh; does nothing with null.
+void rfm_mesh_free(struct RfmMesh *mesh);
+
 // Reads and checks a file, with values for `count` of its params; `params` may be null if there are none. `program` is
 // null after a failure.
 enum RfmStatus rfm_load_file(const char *path,
@@ -420,11 +518,36 @@ enum RfmStatus rfm_load_text_as(const char *text,
                                 struct RfmProgram **program,
                                 struct RfmError **error);
 
+// The same file with other values for `count` of its params, as a program of its own; those that are not named keep
+// theirs. Each is written as `rfm -D` takes it: "r=0.008", or "r=8 mm", whose unit must fit the one that the file writes
+// the param in; a number without a unit is in SI units. `then` is null after a
+// failure, and is not the place of the handle given.
+enum RfmStatus rfm_program_with(const struct RfmProgram *program,
+                                const char *const *settings,
+                                size_t count,
+                                struct RfmProgram **then,
+                                struct RfmError **error);
+
 // The number of solids of a program.
 size_t rfm_solid_count(const struct RfmProgram *program);
 
 // The name of solid `index` of a program; null if there are not so many.
 const char *rfm_solid_name(const struct RfmProgram *program, size_t index);
+
+// The number of params of a program.
+size_t rfm_param_count(const struct RfmProgram *program);
+
+// Param `index` of a program, in the order of the file; false if there are not so many.
+bool rfm_param(const struct RfmProgram *program, size_t index, struct RfmParamInfo *param);
+
+// The number of messages that do not prevent the use of a program.
+size_t rfm_warning_count(const struct RfmProgram *program);
+
+// Message `index` of those that do not prevent the use of a program; false if there are not so many. `rfm check` also
+// measures the solids, and may tell of more.
+bool rfm_warning(const struct RfmProgram *program,
+                 size_t index,
+                 struct RfmDiagnostic *warning);
 
 // Frees a program; does nothing with null.
 void rfm_program_free(struct RfmProgram *program);
@@ -494,6 +617,14 @@ double rfm_sign(const struct RfmSolid *solid,
 
 // The surface as seen from a point; all numbers are NaN for null.
 struct RfmContact rfm_contact(const struct RfmSolid *solid, double x, double y, double z);
+
+// The radius of a ball around a point that is proven not to meet the surface, m, as `rfm eval --what clearance`: never more
+// than the distance, and mostly within 1e-4 of it; positive inside, too, and finite. It takes a thousand times as long as
+// `rfm_contact`. NaN for null.
+double rfm_clearance(const struct RfmSolid *solid,
+                     double x,
+                     double y,
+                     double z);
 
 // The velocity of the surface near a point, m/s: three numbers, zero for a solid at rest. Of a solid that moves and turns
 // without changing its shape it is the whole velocity, of others the part along the normal.

@@ -1,10 +1,14 @@
 //! Questions about many points, and collisions.
 
+use std::cell::OnceCell;
+
+use library::glam::DVec3;
+use library::solid::Distances;
 use library::sph::Rebound;
 use rfm_columns::{Collisions, Column, Job, Number, PARTICLES, Particles, Vectors};
 
 use crate::error::{RfmError, RfmStatus, attempt};
-use crate::solid::{RfmSolid, solid as solid_of};
+use crate::solid::{RfmEntry, RfmSolid, first_entry, solid as solid_of};
 
 /// Points as columns: the first number of each, and the distance between two, bytes.
 #[repr(C)]
@@ -228,6 +232,103 @@ pub unsafe extern "C" fn rfm_contact_many(
     let work = |this: &RfmSolid, p: [&[f64]; 3], out: [&mut [f64]; 5]| this.solid.contact_many(p, out);
     // SAFETY: the caller promises a solid and columns
     unsafe { many::<f64, _>(solid, count, points, results, error, work) }
+}
+
+/// The velocity of the surface near many points, as `rfm_wall_velocity`.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn rfm_wall_velocity_many(
+    solid: *const RfmSolid,
+    count: usize,
+    points: RfmPoints,
+    velocity: RfmVectors,
+    error: *mut *mut RfmError,
+) -> RfmStatus {
+    let points = [points.x, points.y, points.z].map(|start| (start, points.stride));
+    let results = [velocity.x, velocity.y, velocity.z].map(|start| (start, velocity.stride));
+    let work = |this: &RfmSolid, points: [&[f64]; 3], [x, y, z]: [&mut [f64]; 3]| {
+        for i in 0..x.len() {
+            [x[i], y[i], z[i]] = this.solid.wall_velocity(at(points, i)).to_array();
+        }
+    };
+    // SAFETY: the caller promises a solid and columns
+    unsafe { many::<f64, _>(solid, count, points, results, error, work) }
+}
+
+/// Radii of balls around many points that are proven not to meet the surface, as `rfm_clearance`. What all points need of
+/// the solid is found once, so that this is faster than single points.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn rfm_clearance_many(
+    solid: *const RfmSolid,
+    count: usize,
+    points: RfmPoints,
+    clearance: RfmValues,
+    error: *mut *mut RfmError,
+) -> RfmStatus {
+    let points = [points.x, points.y, points.z].map(|start| (start, points.stride));
+    let results = [(clearance.values, clearance.stride)];
+    let known = OnceCell::new();
+    let work = |this: &RfmSolid, points: [&[f64]; 3], [clearance]: [&mut [f64]; 1]| {
+        let distances = known.get_or_init(|| Distances::new(&this.solid));
+        for (i, clearance) in clearance.iter_mut().enumerate() {
+            *clearance = distances.at(at(points, i)).clearance;
+        }
+    };
+    // SAFETY: the caller promises a solid and columns
+    unsafe { many::<f64, _>(solid, count, points, results, error, work) }
+}
+
+/// Point `i` of columns.
+fn at(points: [&[f64]; 3], i: usize) -> DVec3 {
+    DVec3::from_array(points.map(|column| column[i]))
+}
+
+/// Where many straight paths first meet the solid, as `rfm_first_entry`. `entries` has room for `count` of them; the
+/// numbers of a path that does not meet the solid are NaN, and its `certain` is true: that is proven. Of a path from or
+/// to what is no place nothing is known, and its `certain` is false.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn rfm_first_entry_many(
+    solid: *const RfmSolid,
+    count: usize,
+    from: RfmPoints,
+    to: RfmPoints,
+    entries: *mut RfmEntry,
+    error: *mut *mut RfmError,
+) -> RfmStatus {
+    let work = || {
+        // SAFETY: null, or a solid
+        let this = unsafe { solid_of(solid) }?;
+        check::<RfmEntry>(count, entries.is_null(), size_of::<RfmEntry>() as isize, true)?;
+        // SAFETY: the caller promises the columns
+        let paths = unsafe { vectors(count, [from, to]) }?;
+        for i in 0..count {
+            let [from, to] = [0, 1].map(|end| DVec3::from_array(paths.get(end, i)));
+            let nowhere = [f64::NAN; 3];
+            let is_path = from.is_finite() && to.is_finite();
+            let none = RfmEntry { part: f64::NAN, point: nowhere, normal: nowhere, certain: is_path };
+            // SAFETY: the caller promises room for that many
+            unsafe { entries.add(i).write(first_entry(this, from, to).unwrap_or(none)) };
+        }
+        Ok(())
+    };
+    // SAFETY: null, or the caller's
+    unsafe { attempt(error, work) }
+}
+
+/// Points of the caller, which are only read.
+///
+/// # Safety
+/// The columns have `count` numbers each.
+// SAFETY: the caller promises what the reads need
+pub unsafe fn vectors<const N: usize>(count: usize, points: [RfmPoints; N]) -> Result<Vectors<N>, RfmError> {
+    for given in &points {
+        for start in [given.x, given.y, given.z] {
+            check::<f64>(count, start.is_null(), given.stride, false)?;
+        }
+    }
+    let columns = points
+        .map(|given| [given.x, given.y, given.z].map(|start| Column::new(start.cast_mut(), given.stride)));
+    // SAFETY: the caller promises the columns
+    Ok(unsafe { Vectors::new(count, columns) })
 }
 
 /// `rfm_omega_many` in single precision throughout.

@@ -15,7 +15,8 @@ use super::environment::Hosts;
 pub enum RfmStatus {
     /// It did what it was asked.
     RFM_OK = 0,
-    /// A pointer is null that must not be, a text is not UTF-8, or a number is out of range.
+    /// A pointer is null that must not be, a text is not UTF-8, a number is out of range, or what is asked for cannot be made
+    /// of what is given, as the mesh of a solid without an end.
     RFM_BAD_ARGUMENT = 1,
     /// A file could not be read.
     RFM_FILE = 2,
@@ -41,7 +42,7 @@ pub enum RfmSeverity {
     RFM_ERROR = 1,
 }
 
-/// A message about a file. Its texts live as long as the error object.
+/// A message about a file. Its texts live as long as the error object, or the program, that it comes from.
 #[repr(C)]
 pub struct RfmDiagnostic {
     /// How serious it is.
@@ -67,7 +68,8 @@ pub struct RfmError {
     diagnostics: Vec<Message>,
 }
 
-struct Message {
+/// A message about a file, with its texts.
+pub struct Message {
     severity: RfmSeverity,
     texts: [CString; 3],
     help: Option<CString>,
@@ -94,13 +96,14 @@ impl RfmError {
     }
 }
 
-impl From<Diagnostics> for RfmError {
-    fn from(found: Diagnostics) -> Self {
+impl Message {
+    /// All messages of some diagnostics.
+    pub fn all(found: &Diagnostics) -> Vec<Self> {
         let message = |message: &library::diagnostic::Diagnostic| {
             let span = message.primary.span;
             let source = found.source(span.source);
             let place = source.map(|source| source.position(span.start as usize));
-            Message {
+            Self {
                 severity: match message.severity {
                     Severity::Warning => RfmSeverity::RFM_WARNING,
                     Severity::Error => RfmSeverity::RFM_ERROR,
@@ -110,8 +113,28 @@ impl From<Diagnostics> for RfmError {
                 place: place.map_or([0, 0], |place| [place.line, place.column]),
             }
         };
-        let diagnostics = found.list.iter().map(message).collect();
-        Self { status: RFM_MISTAKES, message: text(&found), diagnostics }
+        found.list.iter().map(message).collect()
+    }
+
+    /// Message `index` of a list, as C sees it; false if there are not so many.
+    ///
+    /// # Safety
+    /// `to` is null or may be written to.
+    // SAFETY: the caller promises what the one write needs
+    pub unsafe fn show(list: &[Self], index: usize, to: *mut RfmDiagnostic) -> bool {
+        let Some(found) = list.get(index).filter(|_| !to.is_null()) else { return false };
+        let [code, message, file] = found.texts.each_ref().map(|text| text.as_ptr());
+        let ([line, column], severity) = (found.place, found.severity);
+        let help = found.help.as_ref().map_or(null(), |help| help.as_ptr());
+        // SAFETY: the caller may have it written
+        unsafe { to.write(RfmDiagnostic { severity, code, message, file, line, column, help }) };
+        true
+    }
+}
+
+impl From<Diagnostics> for RfmError {
+    fn from(found: Diagnostics) -> Self {
+        Self { status: RFM_MISTAKES, message: text(&found), diagnostics: Message::all(&found) }
     }
 }
 
@@ -198,15 +221,8 @@ pub unsafe extern "C" fn rfm_error_diagnostic(
     index: usize,
     diagnostic: *mut RfmDiagnostic,
 ) -> bool {
-    // SAFETY: null, or an error object
-    let found = unsafe { error.as_ref() }.and_then(|error| error.diagnostics.get(index));
-    let Some(found) = found.filter(|_| !diagnostic.is_null()) else { return false };
-    let [code, message, file] = found.texts.each_ref().map(|text| text.as_ptr());
-    let ([line, column], severity) = (found.place, found.severity);
-    let help = found.help.as_ref().map_or(null(), |help| help.as_ptr());
-    // SAFETY: the caller may have it written
-    unsafe { diagnostic.write(RfmDiagnostic { severity, code, message, file, line, column, help }) };
-    true
+    // SAFETY: null, or an error object; and room for one, or null
+    unsafe { error.as_ref().is_some_and(|error| Message::show(&error.diagnostics, index, diagnostic)) }
 }
 
 /// Frees an error object; does nothing with null.

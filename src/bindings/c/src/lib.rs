@@ -6,6 +6,7 @@
 //! | `environment` | floating-point exceptions and rounding of the host |
 //! | `program` | files and texts, checked |
 //! | `solid` | solids, and questions about one point |
+//! | `mesh` | volumes, meshes of solids, and surfaces of fluids |
 //! | `columns` | questions about many points, and collisions |
 //! | `mathematics` | sin, exp and so on with the bits of `rfm`, for generated source and object code |
 //!
@@ -19,6 +20,7 @@ mod columns;
 mod environment;
 mod error;
 mod mathematics;
+mod mesh;
 mod program;
 mod solid;
 

@@ -6,10 +6,11 @@ use std::ptr::{null, null_mut};
 use library::compile::files_beside;
 use library::diagnostic::Source;
 use library::files::Files;
-use library::lower::Options;
+use library::lower::{Options, ParamValue};
+use library::quantity::parse_quantity;
 use library::{Error, Program};
 
-use crate::error::{RfmError, RfmStatus, answer, attempt, read_text, text};
+use crate::error::{Message, RfmDiagnostic, RfmError, RfmStatus, answer, attempt, read_text, text};
 
 /// A value for a param of a file.
 #[repr(C)]
@@ -21,10 +22,37 @@ pub struct RfmParam {
     pub value: f64,
 }
 
+/// What a file says of one of its params. Its texts live as long as the program.
+#[repr(C)]
+#[derive(Clone, Copy)]
+pub struct RfmParamInfo {
+    /// Name of the param.
+    pub name: *const c_char,
+    /// Its value, in SI units.
+    pub value: f64,
+    /// The least value that the file allows, in SI units; minus infinity if it states no range.
+    pub low: f64,
+    /// The greatest one; infinity if the file states no range.
+    pub high: f64,
+    /// The unit in which the file writes the value, such as "mm"; null if it writes none.
+    pub unit: *const c_char,
+    /// The text that the file has behind the param; null if it has none.
+    pub description: *const c_char,
+}
+
 /// A checked file.
 pub struct RfmProgram {
     pub program: Program,
     solids: Vec<CString>,
+    params: Vec<Param>,
+    warnings: Vec<Message>,
+}
+
+/// The texts of a param.
+struct Param {
+    name: CString,
+    unit: Option<CString>,
+    description: Option<CString>,
 }
 
 /// The params that a caller gives.
@@ -48,9 +76,21 @@ unsafe fn options(params: *const RfmParam, count: usize) -> Result<Options, RfmE
 }
 
 fn checked(source: Source, options: Options) -> Result<RfmProgram, RfmError> {
-    let program = Program::check(source, options)?;
-    let solids = program.module().solids.iter().map(|solid| text(&solid.name)).collect();
-    Ok(RfmProgram { program, solids })
+    Ok(RfmProgram::new(Program::check(source, options)?))
+}
+
+impl RfmProgram {
+    fn new(program: Program) -> Self {
+        let solids = program.module().solids.iter().map(|solid| text(&solid.name)).collect();
+        let param = |param: &ParamValue| Param {
+            name: text(&param.name),
+            unit: param.unit.as_ref().map(|(_, written)| text(written)),
+            description: param.doc.as_ref().map(text),
+        };
+        let params = program.params().iter().map(param).collect();
+        let warnings = Message::all(&program.warnings());
+        Self { program, solids, params, warnings }
+    }
 }
 
 /// Checks a text with the name that messages show, which a caller knows as `called`.
@@ -130,6 +170,44 @@ pub unsafe extern "C" fn rfm_load_text_as(
     unsafe { hand_out((program, "program"), error, load) }
 }
 
+/// The same file with other values for `count` of its params, as a program of its own; those that are not named keep
+/// theirs. Each is written as `rfm -D` takes it: "r=0.008", or "r=8 mm", whose unit must fit the one that the file writes
+/// the param in; a number without a unit is in SI units. `then` is null after a
+/// failure, and is not the place of the handle given.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn rfm_program_with(
+    program: *const RfmProgram,
+    settings: *const *const c_char,
+    count: usize,
+    then: *mut *mut RfmProgram,
+    error: *mut *mut RfmError,
+) -> RfmStatus {
+    let set = || {
+        // SAFETY: null, or a program
+        let this = unsafe { program.as_ref() }.ok_or_else(|| RfmError::bad("program is null"))?;
+        if settings.is_null() && count > 0 {
+            return Err(RfmError::bad("settings is null"));
+        }
+        let mut changed = this.program.clone();
+        for i in 0..count {
+            // SAFETY: the caller promises that number of texts
+            let setting = unsafe { read_text(*settings.add(i), "a setting") }?;
+            let Some((name, value)) = setting.split_once('=') else {
+                return Err(RfmError::bad(format!("`{setting}` is no setting, expected `name=value`")));
+            };
+            let (value, dimension) =
+                parse_quantity(value).map_err(|why| RfmError::bad(format!("`{setting}`: {why}")))?;
+            changed = match dimension {
+                None => changed.with(name.trim(), value)?,
+                dimension => changed.with_quantity(name.trim(), value, dimension)?,
+            };
+        }
+        Ok(RfmProgram::new(changed))
+    };
+    // SAFETY: null, or the caller's
+    unsafe { hand_out((then, "then"), error, set) }
+}
+
 /// Makes a handle and gives it to the caller: null if it could not be made, so that what an earlier call gave is never
 /// taken for the result of this one.
 ///
@@ -169,6 +247,52 @@ pub unsafe extern "C" fn rfm_solid_name(program: *const RfmProgram, index: usize
     // SAFETY: null, or a program
     let name = unsafe { program.as_ref() }.and_then(|program| program.solids.get(index));
     name.map_or(null(), |name| name.as_ptr())
+}
+
+/// The number of params of a program.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn rfm_param_count(program: *const RfmProgram) -> usize {
+    // SAFETY: null, or a program
+    unsafe { program.as_ref() }.map_or(0, |program| program.params.len())
+}
+
+/// Param `index` of a program, in the order of the file; false if there are not so many.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn rfm_param(
+    program: *const RfmProgram,
+    index: usize,
+    param: *mut RfmParamInfo,
+) -> bool {
+    // SAFETY: null, or a program
+    let Some(this) = (unsafe { program.as_ref() }) else { return false };
+    let found = this.params.get(index).zip(this.program.params().get(index));
+    let Some((texts, known)) = found.filter(|_| !param.is_null()) else { return false };
+    let (low, high) = known.range.unwrap_or((f64::NEG_INFINITY, f64::INFINITY));
+    let pointer = |text: &Option<CString>| text.as_ref().map_or(null(), |text| text.as_ptr());
+    let (unit, description) = (pointer(&texts.unit), pointer(&texts.description));
+    let info = RfmParamInfo { name: texts.name.as_ptr(), value: known.value, low, high, unit, description };
+    // SAFETY: the caller may have it written
+    unsafe { param.write(info) };
+    true
+}
+
+/// The number of messages that do not prevent the use of a program.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn rfm_warning_count(program: *const RfmProgram) -> usize {
+    // SAFETY: null, or a program
+    unsafe { program.as_ref() }.map_or(0, |program| program.warnings.len())
+}
+
+/// Message `index` of those that do not prevent the use of a program; false if there are not so many. `rfm check` also
+/// measures the solids, and may tell of more.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn rfm_warning(
+    program: *const RfmProgram,
+    index: usize,
+    warning: *mut RfmDiagnostic,
+) -> bool {
+    // SAFETY: null, or a program; and room for one, or null
+    unsafe { program.as_ref().is_some_and(|program| Message::show(&program.warnings, index, warning)) }
 }
 
 /// Frees a program; does nothing with null.

@@ -204,7 +204,7 @@ pub unsafe extern "C" fn rfm_range(
 /// # Safety
 /// Its corners are null, or have three numbers each.
 // SAFETY: the caller promises what the two reads need
-unsafe fn read_box(low: *const f64, high: *const f64) -> Result<Aabb, RfmError> {
+pub unsafe fn read_box(low: *const f64, high: *const f64) -> Result<Aabb, RfmError> {
     if low.is_null() || high.is_null() {
         return Err(RfmError::bad("a corner of the box is null"));
     }
@@ -311,6 +311,16 @@ pub unsafe extern "C" fn rfm_contact(solid: *const RfmSolid, x: f64, y: f64, z: 
     })
 }
 
+/// The radius of a ball around a point that is proven not to meet the surface, m, as `rfm eval --what clearance`: never more
+/// than the distance, and mostly within 1e-4 of it; positive inside, too, and finite. It takes a thousand times as long as
+/// `rfm_contact`. NaN for null.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn rfm_clearance(solid: *const RfmSolid, x: f64, y: f64, z: f64) -> f64 {
+    // SAFETY: null, or a solid
+    let Some(this) = (unsafe { solid.as_ref() }) else { return f64::NAN };
+    answer(f64::NAN, || this.solid.distance(DVec3::new(x, y, z)).clearance)
+}
+
 /// The velocity of the surface near a point, m/s: three numbers, zero for a solid at rest. Of a solid that moves and turns
 /// without changing its shape it is the whole velocity, of others the part along the normal.
 #[unsafe(no_mangle)]
@@ -345,18 +355,22 @@ pub unsafe extern "C" fn rfm_first_entry(
     }
     // SAFETY: the caller promises three numbers each
     let (from, to) = unsafe { (*from.cast::<[f64; 3]>(), *to.cast::<[f64; 3]>()) };
-    let (from, to) = (DVec3::from_array(from), DVec3::from_array(to));
-    // nothing is known of a path from or to nowhere
-    if !(from.is_finite() && to.is_finite()) {
-        return false;
-    }
-    let found = answer(None, || this.solid.first_entry(from, to));
-    let Some(found) = found else { return false };
-    let normal = found.normals.mean().unwrap_or(DVec3::ZERO).to_array();
-    let met = RfmEntry { part: found.t, point: found.point.to_array(), normal, certain: found.certain };
+    let found = answer(None, || first_entry(this, DVec3::from_array(from), DVec3::from_array(to)));
+    let Some(met) = found else { return false };
     // SAFETY: null, or room for one
     unsafe { write(entry, [met]) };
     true
+}
+
+/// Where the straight path between two points first meets a solid, as C sees it.
+pub fn first_entry(this: &RfmSolid, from: DVec3, to: DVec3) -> Option<RfmEntry> {
+    // nothing is known of a path from or to nowhere
+    if !(from.is_finite() && to.is_finite()) {
+        return None;
+    }
+    let found = this.solid.first_entry(from, to)?;
+    let normal = found.normals.mean().unwrap_or(DVec3::ZERO).to_array();
+    Some(RfmEntry { part: found.t, point: found.point.to_array(), normal, certain: found.certain })
 }
 
 /// Frees a solid; does nothing with null.

@@ -234,6 +234,148 @@ static void collisions_put_back_and_reflect(void) {
     rfm_program_free(program);
 }
 
+/* params, warnings, and other values for params */
+static void programs_tell_of_their_params(void) {
+    const char *text =
+        "rfm 1\nparam r = 8 mm in 1 mm .. 20 mm \"radius\"\nparam n = 3\nlet unused = 2\nsolid a = sphere(r)\nsolid b = sphere(n)";
+    RfmProgram *program = NULL, *then = NULL;
+    RfmSolid *solid = NULL;
+    RfmError *error = NULL;
+    RfmParamInfo param;
+    RfmDiagnostic warning;
+    CHECK(rfm_load_text(text, "a.rfm", NULL, 0, &program, NULL) == RFM_OK);
+    CHECK(rfm_param_count(program) == 2 && rfm_param_count(NULL) == 0);
+    CHECK(rfm_param(program, 0, &param) && strcmp(param.name, "r") == 0 && param.value == 0.008);
+    CHECK(param.low == 0.001 && param.high == 0.02 && strcmp(param.unit, "mm") == 0);
+    CHECK(strcmp(param.description, "radius") == 0);
+    CHECK(rfm_param(program, 1, &param) && param.value == 3.0 && param.unit == NULL && param.description == NULL);
+    CHECK(param.low == -INFINITY && param.high == INFINITY);
+    CHECK(!rfm_param(program, 2, &param) && !rfm_param(NULL, 0, &param) && !rfm_param(program, 0, NULL));
+    CHECK(rfm_warning_count(program) == 1 && rfm_warning(program, 0, &warning) && !rfm_warning(program, 1, &warning));
+    CHECK(warning.severity == RFM_WARNING && strcmp(warning.code, "W0401") == 0 && warning.line == 4);
+    CHECK(rfm_warning_count(NULL) == 0 && !rfm_warning(NULL, 0, &warning));
+    const char *settings[] = {"r=1 cm", "n = 2"};
+    CHECK(rfm_program_with(program, settings, 2, &then, NULL) == RFM_OK);
+    CHECK(rfm_param(then, 0, &param) && param.value == 0.01 && rfm_param(then, 1, &param) && param.value == 2.0);
+    CHECK(rfm_param(program, 0, &param) && param.value == 0.008);
+    CHECK(rfm_solid(then, "b", &solid, NULL) == RFM_OK && rfm_sign(solid, 1.9, 0, 0) == 1.0 && rfm_sign(solid, 2.1, 0, 0) == -1.0);
+    rfm_solid_free(solid);
+    rfm_program_free(then);
+    CHECK(rfm_program_with(program, (const char *[]){"r=1 kg"}, 1, &then, &error) == RFM_MISTAKES && then == NULL);
+    rfm_error_free(error);
+    CHECK(rfm_program_with(program, (const char *[]){"r=1 m"}, 1, &then, NULL) == RFM_MISTAKES);
+    CHECK(rfm_program_with(program, (const char *[]){"r"}, 1, &then, &error) == RFM_BAD_ARGUMENT);
+    CHECK(strcmp(rfm_error_message(error), "`r` is no setting, expected `name=value`") == 0);
+    rfm_error_free(error);
+    CHECK(rfm_program_with(program, (const char *[]){"r=big"}, 1, &then, NULL) == RFM_BAD_ARGUMENT);
+    CHECK(rfm_program_with(program, NULL, 1, &then, NULL) == RFM_BAD_ARGUMENT);
+    CHECK(rfm_program_with(NULL, NULL, 0, &then, NULL) == RFM_BAD_ARGUMENT);
+    rfm_program_free(program);
+}
+
+/* what is asked of one point has the same answer among many */
+static void more_questions_about_many_points(void) {
+    const char *text = "rfm 1\nsolid rising = sphere(0.5).move([0, 0, t])\nsolid ball = sphere(0.5)";
+    RfmProgram *program = NULL;
+    RfmSolid *rising = NULL, *ball = NULL;
+    double p[3][3] = {{0.7, 0, 0}, {0.1, 0.2, 0.9}, {0, NAN, 0}}, q[3][3] = {{-0.7, 0, 0}, {3, 3, 3}, {0, 0, 0}};
+    double v[3][3], c[3], one[3];
+    CHECK(rfm_load_text(text, "ball", NULL, 0, &program, NULL) == RFM_OK);
+    CHECK(rfm_solid(program, "rising", &rising, NULL) == RFM_OK && rfm_solid(program, "ball", &ball, NULL) == RFM_OK);
+    RfmPoints points = {&p[0][0], &p[0][1], &p[0][2], sizeof p[0]}, ends = {&q[0][0], &q[0][1], &q[0][2], sizeof q[0]};
+    RfmVectors velocity = {&v[0][0], &v[0][1], &v[0][2], sizeof v[0]};
+    CHECK(rfm_wall_velocity_many(rising, 3, points, velocity, NULL) == RFM_OK);
+    for (int i = 0; i < 3; i++) {
+        rfm_wall_velocity(rising, p[i][0], p[i][1], p[i][2], one);
+        for (int k = 0; k < 3; k++) CHECK(same(v[i][k], one[k]));
+    }
+    CHECK(fabs(v[0][2] - 1.0) < 1e-12);
+    CHECK(rfm_clearance_many(ball, 2, points, (RfmValues){c, sizeof(double)}, NULL) == RFM_OK);
+    for (int i = 0; i < 2; i++) CHECK(same(c[i], rfm_clearance(ball, p[i][0], p[i][1], p[i][2])));
+    CHECK(c[0] <= 0.2 && c[0] > 0.1999 && isnan(rfm_clearance(NULL, 0, 0, 0)));
+    RfmEntry entries[3];
+    CHECK(rfm_first_entry_many(ball, 3, points, ends, entries, NULL) == RFM_OK);
+    CHECK(fabs(entries[0].point[0] - 0.5) < 1e-7 && entries[0].certain && entries[0].normal[0] > 0.999);
+    CHECK(isnan(entries[1].part) && isnan(entries[1].point[0]) && entries[1].certain);
+    CHECK(isnan(entries[2].part) && !entries[2].certain);
+    CHECK(rfm_first_entry_many(ball, 3, points, ends, NULL, NULL) == RFM_BAD_ARGUMENT);
+    CHECK(rfm_first_entry_many(ball, 0, points, ends, NULL, NULL) == RFM_OK);
+    CHECK(rfm_wall_velocity_many(NULL, 3, points, velocity, NULL) == RFM_BAD_ARGUMENT);
+    rfm_solid_free(rising);
+    rfm_solid_free(ball);
+    rfm_program_free(program);
+}
+
+/* six times the volume that triangles enclose */
+static double enclosed(const RfmMesh *mesh) {
+    const double *p = rfm_mesh_vertices(mesh);
+    const uint32_t *corners = rfm_mesh_triangles(mesh);
+    double sum = 0;
+    for (size_t i = 0; i < rfm_mesh_triangle_count(mesh); i++) {
+        const double *a = p + 3 * corners[3 * i], *b = p + 3 * corners[3 * i + 1], *c = p + 3 * corners[3 * i + 2];
+        sum += a[0] * (b[1] * c[2] - b[2] * c[1]) + a[1] * (b[2] * c[0] - b[0] * c[2]) + a[2] * (b[0] * c[1] - b[1] * c[0]);
+    }
+    return sum;
+}
+
+static void solids_and_fluids_have_meshes(void) {
+    enum { SIDE = 10, MANY = SIDE * SIDE * SIDE };
+    const char *text = "rfm 1\nsolid brick = box([0, 0, 0], [1, 2, 3])\nsolid floor = z <= 0\nsolid no = sphere(1) and z >= 2";
+    RfmProgram *program = NULL;
+    RfmSolid *brick = NULL, *floor = NULL, *no = NULL;
+    RfmMesh *mesh = NULL;
+    RfmError *error = NULL;
+    const double low[3] = {0, 0, -1}, high[3] = {1, 1, 1};
+    double volume = 0, uncertainty = 0;
+    CHECK(rfm_load_text(text, "brick", NULL, 0, &program, NULL) == RFM_OK);
+    CHECK(rfm_solid(program, "brick", &brick, NULL) == RFM_OK && rfm_solid(program, "floor", &floor, NULL) == RFM_OK);
+    CHECK(rfm_solid(program, "no", &no, NULL) == RFM_OK);
+    CHECK(rfm_volume(brick, 96, &volume, &uncertainty, NULL) == RFM_OK);
+    CHECK(fabs(volume - 6) < 1e-6 && uncertainty >= 0 && uncertainty < 1e-3);
+    CHECK(rfm_volume(floor, 96, &volume, NULL, &error) == RFM_BAD_ARGUMENT);
+    CHECK(strstr(rfm_error_message(error), "`floor` could not be proven to end") != NULL);
+    rfm_error_free(error);
+    CHECK(rfm_volume(brick, 96, NULL, NULL, NULL) == RFM_BAD_ARGUMENT);
+    CHECK(rfm_mesh(brick, 32, NULL, NULL, &mesh, NULL) == RFM_OK);
+    CHECK(rfm_mesh_vertex_count(mesh) > 100 && rfm_mesh_triangle_count(mesh) > 200 && fabs(enclosed(mesh) - 36) < 1e-6);
+    CHECK(fabs(fabs(rfm_mesh_normals(mesh)[0]) + fabs(rfm_mesh_normals(mesh)[1]) + fabs(rfm_mesh_normals(mesh)[2])) > 0.99);
+    rfm_mesh_free(mesh);
+    CHECK(rfm_mesh(floor, 16, NULL, NULL, &mesh, NULL) == RFM_BAD_ARGUMENT && mesh == NULL);
+    CHECK(rfm_mesh(floor, 16, low, high, &mesh, NULL) == RFM_OK && fabs(enclosed(mesh) - 6) < 1e-6);
+    rfm_mesh_free(mesh);
+    CHECK(rfm_mesh(floor, 16, low, NULL, &mesh, NULL) == RFM_BAD_ARGUMENT);
+    CHECK(rfm_mesh(no, 16, NULL, NULL, &mesh, NULL) == RFM_OK && rfm_mesh_triangle_count(mesh) == 0);
+    rfm_mesh_free(mesh);
+    static double p[MANY][3];
+    for (int i = 0; i < MANY; i++) {
+        p[i][0] = 0.1 * (i % SIDE) + 0.05;
+        p[i][1] = 0.1 * (i / SIDE % SIDE) + 0.05;
+        p[i][2] = 0.1 * (i / SIDE / SIDE) - 0.95;
+    }
+    RfmPoints particles = {&p[0][0], &p[0][1], &p[0][2], sizeof p[0]};
+    CHECK(rfm_fluid_surface(MANY, particles, 0.1, 0.0, low, high, &mesh, NULL) == RFM_OK);
+    CHECK(fabs(enclosed(mesh) / 6 - 1) < 0.05);
+    for (size_t i = 0; i < rfm_mesh_vertex_count(mesh); i++) {
+        const double *v = rfm_mesh_vertices(mesh) + 3 * i;
+        CHECK(v[0] >= 0 && v[0] <= 1 && v[2] >= -1);
+    }
+    size_t vertices = rfm_mesh_vertex_count(mesh);
+    rfm_mesh_free(mesh);
+    p[0][1] = NAN;
+    CHECK(rfm_fluid_surface(MANY, particles, 0.1, 0.05, NULL, NULL, &mesh, NULL) == RFM_OK);
+    CHECK(rfm_mesh_vertex_count(mesh) > 100 && rfm_mesh_vertex_count(mesh) < vertices);
+    rfm_mesh_free(mesh);
+    CHECK(rfm_fluid_surface(0, particles, 0.1, 0.0, NULL, NULL, &mesh, NULL) == RFM_OK && rfm_mesh_vertex_count(mesh) == 0);
+    rfm_mesh_free(mesh);
+    CHECK(rfm_fluid_surface(MANY, particles, 0.0, 0.0, NULL, NULL, &mesh, NULL) == RFM_BAD_ARGUMENT && mesh == NULL);
+    CHECK(rfm_mesh_vertices(NULL) == NULL && rfm_mesh_triangle_count(NULL) == 0);
+    rfm_mesh_free(NULL);
+    rfm_solid_free(brick);
+    rfm_solid_free(floor);
+    rfm_solid_free(no);
+    rfm_program_free(program);
+}
+
 int main(int count, char **arguments) {
     if (count != 3) return 2;
     RfmSolid *pawn = load(arguments[1], "pawn");
@@ -245,6 +387,9 @@ int main(int count, char **arguments) {
     mistakes_become_error_objects(pawn);
     collisions_put_back_and_reflect();
     corners_and_many_parts();
+    programs_tell_of_their_params();
+    more_questions_about_many_points();
+    solids_and_fluids_have_meshes();
     rfm_solid_free(pawn);
     printf("%d failures\n", failures);
     return failures != 0;

@@ -3,6 +3,7 @@
 //! | file | what it has |
 //! |---|---|
 //! | `program`, `solid`, `mesh`, `slice`, `simulation` | one class of Python each |
+//! | `solid::questions` | those of `Solid` about points |
 //! | `points`, `results`, `evaluate`, `path` | arguments as columns, new and given arrays, questions about many points |
 //! | `begin` | scenes at their start, and their probes |
 //! | `collision` | particles that are put back in arrays of the caller |

@@ -14,11 +14,11 @@ use rfm::field::Field;
 use rfm::geom::Aabb;
 use rfm::glam::DVec3;
 use rfm::mesh::{
-    self, FORMATS, Grid, LengthUnit, Mesh, MeshError, Report, Resolution, VolumeError, dual_contouring,
-    marching_cubes,
+    self, FORMATS, Grid, LengthUnit, Mesh, MeshError, Report, Resolution, dual_contouring, marching_cubes,
 };
 use rfm::solid::Bounds;
 use rfm::view;
+use rfm_columns::NoVolume;
 
 use crate::error::{not_read, refused};
 use crate::memory::rows_of;
@@ -38,74 +38,7 @@ pub fn mesher(method: &str) -> PyResult<Mesher> {
     }
 }
 
-/// A volume, m³, and what is doubtful about it.
-pub struct Measured {
-    pub volume: f64,
-    pub doubt: Option<String>,
-}
-
-impl Measured {
-    fn certain(volume: f64) -> Self {
-        Self { volume, doubt: None }
-    }
-}
-
-/// An error of a volume above this part of it is told.
-const LARGE_ERROR: f64 = 0.01;
-
-/// The volume of a solid: on meshes with so many cells along the longest side, or along lines if parts of it are too thin
-/// for them.
-///
-/// # Errors
-/// `RfmError` if no box around the solid is known, if it cannot be meshed, or if neither meshes nor lines show it.
-pub fn volume(solid: &Solid, cells: usize, watch: &Watch) -> PyResult<Measured> {
-    let bounds = match solid.bounds() {
-        Bounds::Within(bounds) => bounds,
-        Bounds::Empty => return Ok(Measured::certain(0.0)),
-        Bounds::Unbounded => return Err(refused(unbounded(solid))),
-    };
-    let surface = solid.surface(bounds.grown(0.1 * bounds.size().max_element()));
-    let by_mesh = match mesh::volume(&*surface, bounds, cells, watch) {
-        Ok(found) => Some(found.volume),
-        Err(VolumeError::TooThin) => None,
-        Err(error) => return Err(refused(error)),
-    };
-    if let Some(volume) = by_mesh {
-        let grid = Grid::around(bounds, Resolution::Cells(cells)).map_err(refused)?;
-        let thin = mesh::thin_cells(&*surface, &grid, watch).map_err(refused)?;
-        if thin.is_wedge || thin.count == 0 && !thin.ended {
-            return Ok(Measured::certain(volume));
-        }
-    }
-    match (mesh::by_lines(&*surface, bounds, watch), by_mesh) {
-        // what the mesh lacks is less than what the lines leave uncertain
-        (Some(found), Some(volume)) if (found.volume - volume).abs() <= found.error => {
-            Ok(Measured::certain(volume))
-        }
-        (Some(found), _) => {
-            let error = found.error / found.volume;
-            let doubt = (error > LARGE_ERROR).then(|| {
-                format!(
-                    "parts of the solid are too thin for {cells} cells, so its volume is known to {:.0} % only",
-                    100.0 * error
-                )
-            });
-            Ok(Measured { volume: found.volume, doubt })
-        }
-        (None, Some(volume)) => {
-            let doubt =
-                format!("parts of the solid are too thin for {cells} cells, and its volume is without them");
-            Ok(Measured { volume, doubt: Some(doubt) })
-        }
-        (None, None) => Err(refused(VolumeError::TooThin)),
-    }
-}
-
-fn unbounded(solid: &Solid) -> String {
-    format!("`{}` could not be proven to end anywhere: state the box to mesh", solid.name())
-}
-
-/// A closed triangle mesh of a solid's surface. Its arrays are read-only; copy them to change them.
+/// A closed triangle mesh of a solid's surface, or of a fluid's. Its arrays are read-only; copy them to change them.
 ///
 /// A pickle holds the arrays and what was found about them; nothing is meshed again. As long as ``thin_cells`` was not
 /// asked for, it holds the solid, too.
@@ -113,7 +46,7 @@ fn unbounded(solid: &Solid) -> String {
 pub struct PyMesh {
     mesh: Mesh,
     findings: Findings,
-    /// What it was made of, and in which cells; `None` for an empty solid, and for a mesh from a pickle whose thin
+    /// What it was made of, and in which cells; `None` for an empty solid, a fluid, and for a mesh from a pickle whose thin
     /// cells are counted.
     made_of: Option<(Py<PySolid>, Grid)>,
     thin_cells: OnceLock<usize>,
@@ -159,7 +92,7 @@ impl Found {
             (Some(domain), _) => Grid::filling(&domain, resolution),
             (None, Bounds::Within(bounds)) => Grid::around(bounds, resolution),
             (None, Bounds::Empty) => return Ok(Self::empty()),
-            (None, Bounds::Unbounded) => return Err(refused(unbounded(solid))),
+            (None, Bounds::Unbounded) => return Err(refused(NoVolume::Unbounded(solid.name().to_string()))),
         };
         let grid = grid.map_err(refused)?;
         let field = solid.surface(*grid.bounds());
@@ -174,6 +107,18 @@ impl Found {
     fn empty() -> Self {
         let nowhere = rfm::field::Closures { omega: |_| -1.0, gradient: |_| DVec3::ZERO };
         Self::checked(Mesh::default(), &nowhere, None)
+    }
+
+    /// The surface of a fluid. No formula says how far its vertices are from where they ought to be.
+    pub fn of_fluid(mesh: Mesh) -> PyMesh {
+        let shells = mesh::shells(&mesh);
+        let findings = Findings {
+            volume: shells.iter().map(|shell| shell.volume).sum(),
+            area: shells.iter().map(|shell| shell.area).sum(),
+            closed: mesh::is_closed_manifold(&mesh),
+            max_distance: f64::NAN,
+        };
+        PyMesh::new(mesh, findings, None, Some(0))
     }
 
     fn checked(mesh: Mesh, field: &dyn Field, grid: Option<Grid>) -> Self {
@@ -342,7 +287,7 @@ impl PyMesh {
     }
 
     /// Largest distance of the mesh's vertices from the surface, m. Between them triangles leave a curved surface by up
-    /// to an eighth of the squared cell times its curvature.
+    /// to an eighth of the squared cell times its curvature. NaN for the surface of a fluid, which no formula has.
     #[getter]
     fn max_distance(&self) -> f64 {
         self.findings.max_distance

@@ -186,7 +186,7 @@ impl PyProgram {
         self.program.module().scenes.iter().map(|scene| &*scene.name).collect()
     }
 
-    /// Params by their names, in the order of the file: `Param` has ``value``, ``low``, ``high`` and ``doc``.
+    /// Params by their names, in the order of the file: `Param` has ``value``, ``low``, ``high``, ``doc`` and ``unit``.
     #[getter]
     fn params<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         static CLASS: PyOnceLock<Py<PyType>> = PyOnceLock::new();
@@ -194,7 +194,9 @@ impl PyProgram {
         let params = PyDict::new(py);
         for param in &self.program.module().params {
             let (low, high) = param.range.unzip();
-            params.set_item(&param.name, class.call1((param.value, low, high, param.doc.as_deref()))?)?;
+            let unit = param.unit.as_ref().map(|(_, text)| &**text);
+            let fields = (param.value, low, high, param.doc.as_deref(), unit);
+            params.set_item(&param.name, class.call1(fields)?)?;
         }
         Ok(params)
     }

@@ -12,11 +12,13 @@ use pyo3::types::{PyDict, PyTuple, PyType};
 use rfm::Experiment;
 use rfm::diagnostic::Diagnostics;
 use rfm::experiment::probe_column;
+use rfm::fluid_surface::Reconstruction;
+use rfm::glam::DVec3;
 use rfm::sph::{Checkpoint, Simulation, StepError};
 
 use crate::begin::{Begun, Recorder, begin, recorders};
 use crate::error::{diagnostics, not_read, refused};
-use crate::mesh::write_file;
+use crate::mesh::{Found, PyMesh, write_file};
 use crate::pool::{LOOK, Threads, run, run_watched};
 use crate::program::PyProgram;
 use crate::show;
@@ -376,6 +378,38 @@ impl PySimulation {
         result
     }
 
+    /// The surface of the fluid as it is now: what ``rfm render --surface`` draws and ``rfm mesh DIR --fluid`` writes.
+    ///
+    /// The fluid goes up to a wall of the box that it touches, and never beyond it. Particles whose places are not finite
+    /// are left out.
+    ///
+    /// Parameters
+    /// ----------
+    /// cell : float, m, optional
+    ///     Size of a cell of the marching cubes; a quarter of `spacing` if it is not stated.
+    ///
+    /// Returns
+    /// -------
+    /// `Mesh`; an empty one without particles
+    ///
+    /// Raises
+    /// ------
+    /// RfmError
+    ///     If the cell is too small for the particles, or for the extent of the fluid.
+    #[pyo3(signature = (*, cell=None))]
+    fn surface(&self, py: Python<'_>, cell: Option<f64>) -> PyResult<PyMesh> {
+        let state = self.state()?;
+        let position = &state.simulation.particles().position;
+        let places: Vec<DVec3> =
+            (0..position.len()).map(|i| position.get(i)).filter(|p| p.is_finite()).collect();
+        let advised = Reconstruction::of_radius(0.5 * state.simulation.parameters().spacing());
+        drop(state);
+        let vessel = Some(self.experiment.domain());
+        let reconstruction = Reconstruction { cell: cell.unwrap_or(advised.cell), vessel, ..advised };
+        let made = run(py, self.threads, || reconstruction.mesh(&places))?;
+        Ok(Found::of_fluid(made.map_err(refused)?))
+    }
+
     /// What energy, volume and densities have shown since the start: `Audit`.
     #[getter]
     fn audit<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
@@ -466,7 +500,7 @@ impl PySimulation {
     fn save(&self, py: Python<'_>, folder: PathBuf) -> PyResult<PathBuf> {
         let state = self.state_to_change()?;
         let mut checkpoint = state.simulation.checkpoint();
-        checkpoint.fingerprint = self.experiment.fingerprint();
+        self.experiment.mark().stamp(&mut checkpoint);
         for recorder in &state.recorders {
             checkpoint.set(&probe_column(&recorder.name), recorder.gauge.memory().to_vec());
         }
@@ -500,8 +534,14 @@ impl PySimulation {
         let bytes = std::fs::read(&path).map_err(|error| not_read(&path.display().to_string(), error))?;
         let unusable = |why: String| refused(format!("cannot go on from `{}`: {why}", path.display()));
         let checkpoint = Checkpoint::read(&bytes).map_err(|error| unusable(error.to_string()))?;
-        if checkpoint.fingerprint != self.experiment.fingerprint() {
-            return Err(unusable("it belongs to another scene, or this one was changed since".into()));
+        let mark = self.experiment.mark();
+        if !mark.fits(&checkpoint) {
+            let mut why = "it belongs to another scene, or this one was changed since".to_string();
+            let differences = mark.differences(&checkpoint);
+            if !differences.is_empty() {
+                why.push_str(&format!(": {}", differences.join(", ")));
+            }
+            return Err(unusable(why));
         }
         let resumed = run(py, self.threads, || {
             let mut simulation =

@@ -1,9 +1,10 @@
 //! The class `Solid`.
 
+mod questions;
+
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
-use pyo3::sync::PyOnceLock;
-use pyo3::types::{PyDict, PyTuple, PyType};
+use pyo3::types::{PyDict, PyTuple};
 use rfm::field::Field;
 use rfm::geom::Aabb;
 use rfm::glam::DVec3;
@@ -11,17 +12,16 @@ use rfm::solid::Chosen;
 use rfm::source::Target;
 use rfm::sph::Rebound;
 use rfm::{Solid, mesh};
-use rfm_columns::Obstacle;
+use rfm_columns::{Obstacle, volume};
 
 use crate::collision::collide;
-use crate::error::warn;
-use crate::evaluate::ask;
+use crate::error::{refused, warn};
 use crate::mesh::{Found, PyMesh};
 use crate::path::first_entry;
 use crate::points::aabb;
 use crate::pool::{Threads, run_watched};
 use crate::program::PyProgram;
-use crate::results::{array, corners, no_out, several};
+use crate::results::corners;
 use crate::show;
 use crate::slice::{PySlice, Sliced};
 use crate::source::{Asked, text};
@@ -119,276 +119,6 @@ impl PySolid {
     #[getter]
     fn is_compiled(&self) -> bool {
         self.solid.is_compiled()
-    }
-
-    /// ω at points, as `omega`; for a single point, three numbers, a ``float``.
-    #[pyo3(signature = (points, y=None, z=None, /))]
-    fn __call__<'py>(
-        &self,
-        points: &Bound<'py, PyAny>,
-        y: Option<&Bound<'py, PyAny>>,
-        z: Option<&Bound<'py, PyAny>>,
-    ) -> PyResult<Bound<'py, PyAny>> {
-        self.omega(points, y, z, None, Threads::Auto)
-    }
-
-    /// ω at points.
-    ///
-    /// Parameters
-    /// ----------
-    /// points : array of shape (..., 3), m; or x, y, z : arrays that broadcast together, or numbers
-    /// out : array of shape (...), optional
-    /// threads : int, optional
-    ///
-    /// Returns
-    /// -------
-    /// Array of shape (...), in the units of the formula; a ``float`` for a single point. If the file states a
-    /// tolerance, doubles are computed by the cheapest program that keeps it.
-    #[pyo3(signature = (points, y=None, z=None, /, *, out=None, threads=Threads::Auto))]
-    #[pyo3(text_signature = "($self, points, y=None, z=None, /, *, out=None, threads=None)")]
-    fn omega<'py>(
-        &self,
-        points: &Bound<'py, PyAny>,
-        y: Option<&Bound<'py, PyAny>>,
-        z: Option<&Bound<'py, PyAny>>,
-        out: Option<&Bound<'py, PyAny>>,
-        threads: Threads,
-    ) -> PyResult<Bound<'py, PyAny>> {
-        ask!(
-            self,
-            (points, y, z),
-            threads,
-            |p| {
-                no_out(out)?;
-                Ok(self.omega_at(p).into_pyobject(points.py())?.into_any())
-            },
-            |question, columns| question.omega(&columns, out)
-        )
-    }
-
-    /// ∇ω at points.
-    ///
-    /// Near the surface it points into the solid. At edges and corners it is one finite member of the limits.
-    ///
-    /// Parameters
-    /// ----------
-    /// points : array of shape (..., 3), m; or x, y, z : arrays that broadcast together, or numbers
-    /// out : array of shape (..., 3), optional
-    /// threads : int, optional
-    ///
-    /// Returns
-    /// -------
-    /// Array of shape (..., 3), in units of ω per metre. If x, y and z came as columns, it consists of columns:
-    /// ``gradient[:, 0]`` is contiguous.
-    #[pyo3(signature = (points, y=None, z=None, /, *, out=None, threads=Threads::Auto))]
-    #[pyo3(text_signature = "($self, points, y=None, z=None, /, *, out=None, threads=None)")]
-    fn gradient<'py>(
-        &self,
-        points: &Bound<'py, PyAny>,
-        y: Option<&Bound<'py, PyAny>>,
-        z: Option<&Bound<'py, PyAny>>,
-        out: Option<&Bound<'py, PyAny>>,
-        threads: Threads,
-    ) -> PyResult<Bound<'py, PyAny>> {
-        ask!(
-            self,
-            (points, y, z),
-            threads,
-            |p| {
-                no_out(out)?;
-                Ok(array(points.py(), self.solid.omega_grad(p).1))
-            },
-            |question, columns| question.gradient(&columns, out)
-        )
-    }
-
-    /// ω and ∇ω at points, for the price of the gradient.
-    ///
-    /// Parameters
-    /// ----------
-    /// points : array of shape (..., 3), m; or x, y, z : arrays that broadcast together, or numbers
-    /// out : tuple of two arrays, optional
-    ///     For ω of shape (...), and for ∇ω of shape (..., 3); either may be None.
-    /// threads : int, optional
-    ///
-    /// Returns
-    /// -------
-    /// Tuple of both, as `omega` and `gradient` return them; a tolerance of the file is not used.
-    #[pyo3(signature = (points, y=None, z=None, /, *, out=None, threads=Threads::Auto))]
-    #[pyo3(text_signature = "($self, points, y=None, z=None, /, *, out=None, threads=None)")]
-    fn omega_gradient<'py>(
-        &self,
-        points: &Bound<'py, PyAny>,
-        y: Option<&Bound<'py, PyAny>>,
-        z: Option<&Bound<'py, PyAny>>,
-        out: Option<&Bound<'py, PyAny>>,
-        threads: Threads,
-    ) -> PyResult<(Bound<'py, PyAny>, Bound<'py, PyAny>)> {
-        ask!(
-            self,
-            (points, y, z),
-            threads,
-            |p| {
-                no_out(out)?;
-                let (omega, gradient) = self.solid.omega_grad(p);
-                Ok((omega.into_pyobject(points.py())?.into_any(), array(points.py(), gradient)))
-            },
-            |question, columns| question.omega_gradient(&columns, several(out)?)
-        )
-    }
-
-    /// Whether points are inside (1), on the surface (0) or outside (-1): exactly the logic of the parts, each
-    /// by the sign of its rounded formula.
-    ///
-    /// Parameters
-    /// ----------
-    /// points : array of shape (..., 3), m; or x, y, z : arrays that broadcast together, or numbers
-    /// out : array of shape (...), optional
-    /// threads : int, optional
-    ///
-    /// Returns
-    /// -------
-    /// Array of shape (...) with the type of the points; NaN where the formula has no value.
-    #[pyo3(signature = (points, y=None, z=None, /, *, out=None, threads=Threads::Auto))]
-    #[pyo3(text_signature = "($self, points, y=None, z=None, /, *, out=None, threads=None)")]
-    fn sign<'py>(
-        &self,
-        points: &Bound<'py, PyAny>,
-        y: Option<&Bound<'py, PyAny>>,
-        z: Option<&Bound<'py, PyAny>>,
-        out: Option<&Bound<'py, PyAny>>,
-        threads: Threads,
-    ) -> PyResult<Bound<'py, PyAny>> {
-        ask!(
-            self,
-            (points, y, z),
-            threads,
-            |p| {
-                no_out(out)?;
-                Ok(self.solid.sign(p).into_pyobject(points.py())?.into_any())
-            },
-            |question, columns| question.sign(&columns, out)
-        )
-    }
-
-    /// The surface as seen from points: accurate near a face, an estimate far away. Before an edge or a corner that
-    /// stands out the distance is that of the nearest face's plane: too small by up to 1 - sin(a/2) of it before an
-    /// edge with the angle a of the solid, 29 % at a right angle, more at an acute one; and by more before a corner,
-    /// 42 % at that of a box. Inside, beside an edge that goes in, it may be too long, by up to a half between two
-    /// balls that overlap.
-    ///
-    /// Parameters
-    /// ----------
-    /// points : array of shape (..., 3), m; or x, y, z : arrays that broadcast together, or numbers
-    /// out : tuple of three arrays, optional
-    ///     For the distance, the normal and the curvature; each may be None.
-    /// threads : int, optional
-    ///
-    /// Returns
-    /// -------
-    /// `Contact`: ``distance`` of shape (...), m, positive outside, infinite where no surface is found; ``normal`` of
-    /// shape (..., 3), the outward unit normal of the nearest face, the mean of two at an edge, zero where there is
-    /// none; ``curvature`` of shape (...), the mean curvature, 1/m, positive where the solid is convex. Away from the
-    /// face it is that of the surface of equal distance through the point.
-    #[pyo3(signature = (points, y=None, z=None, /, *, out=None, threads=Threads::Auto))]
-    #[pyo3(text_signature = "($self, points, y=None, z=None, /, *, out=None, threads=None)")]
-    fn contact<'py>(
-        &self,
-        points: &Bound<'py, PyAny>,
-        y: Option<&Bound<'py, PyAny>>,
-        z: Option<&Bound<'py, PyAny>>,
-        out: Option<&Bound<'py, PyAny>>,
-        threads: Threads,
-    ) -> PyResult<Bound<'py, PyAny>> {
-        static CLASS: PyOnceLock<Py<PyType>> = PyOnceLock::new();
-        let py = points.py();
-        let (distance, normal, curvature) = ask!(
-            self,
-            (points, y, z),
-            threads,
-            |p| {
-                no_out(out)?;
-                let found = self.solid.contact(p);
-                (
-                    found.distance.into_pyobject(py)?.into_any(),
-                    array(py, found.normal),
-                    found.mean_curvature.into_pyobject(py)?.into_any(),
-                )
-            },
-            |question, columns| question.contact(&columns, several(out)?)?
-        );
-        CLASS.import(py, "rfm._records", "Contact")?.call1((distance, normal, curvature))
-    }
-
-    /// The velocity of the surface near points, as `rfm_wall_velocity` in C: zero for a solid at rest. For a solid that
-    /// is moved and turned as a whole it is that of the body, for others that of the nearest face along its normal.
-    ///
-    /// Parameters
-    /// ----------
-    /// points : array of shape (..., 3), m; or x, y, z : arrays that broadcast together, or numbers
-    /// out : array of shape (..., 3), optional
-    /// threads : int, optional
-    ///
-    /// Returns
-    /// -------
-    /// Array of shape (..., 3), m/s.
-    #[pyo3(signature = (points, y=None, z=None, /, *, out=None, threads=Threads::Auto))]
-    #[pyo3(text_signature = "($self, points, y=None, z=None, /, *, out=None, threads=None)")]
-    fn wall_velocity<'py>(
-        &self,
-        points: &Bound<'py, PyAny>,
-        y: Option<&Bound<'py, PyAny>>,
-        z: Option<&Bound<'py, PyAny>>,
-        out: Option<&Bound<'py, PyAny>>,
-        threads: Threads,
-    ) -> PyResult<Bound<'py, PyAny>> {
-        ask!(
-            self,
-            (points, y, z),
-            threads,
-            |p| {
-                no_out(out)?;
-                Ok(array(points.py(), self.solid.wall_velocity(p)))
-            },
-            |question, columns| question.wall_velocity(&columns, out)
-        )
-    }
-
-    /// Radii of balls around points that are proven not to meet the surface, as ``rfm eval --what clearance``: never
-    /// more than the distance, and mostly within 1e-4 of it. It takes a thousand times as long as `contact`.
-    ///
-    /// Parameters
-    /// ----------
-    /// points : array of shape (..., 3), m; or x, y, z : arrays that broadcast together, or numbers
-    /// out : array of shape (...), optional
-    /// threads : int, optional
-    ///     If it is not stated, all are used from three points on.
-    ///
-    /// Returns
-    /// -------
-    /// Array of shape (...), m, positive inside, too, and always finite: nothing is looked for farther away than
-    /// 3.6e75, which is the clearance of a solid without a surface, 3.4e38 in single precision.
-    #[pyo3(signature = (points, y=None, z=None, /, *, out=None, threads=Threads::Auto))]
-    #[pyo3(text_signature = "($self, points, y=None, z=None, /, *, out=None, threads=None)")]
-    fn clearance<'py>(
-        &self,
-        points: &Bound<'py, PyAny>,
-        y: Option<&Bound<'py, PyAny>>,
-        z: Option<&Bound<'py, PyAny>>,
-        out: Option<&Bound<'py, PyAny>>,
-        threads: Threads,
-    ) -> PyResult<Bound<'py, PyAny>> {
-        ask!(
-            self,
-            (points, y, z),
-            threads,
-            |p| {
-                no_out(out)?;
-                let py = points.py();
-                Ok(py.detach(|| self.solid.distance(p).clearance).into_pyobject(py)?.into_any())
-            },
-            |question, columns| question.clearance(&columns, out)
-        )
     }
 
     /// Where straight paths first meet the solid.
@@ -527,7 +257,7 @@ impl PySolid {
 
     /// The volume, m³, found on meshes with `cells` cells, two thirds and half as many along the longest side. A solid of
     /// which parts are too thin for these is measured along lines that cross it; a warning says if more than a hundredth
-    /// of the volume is uncertain.
+    /// of the volume is uncertain. That of a solid made of triangles is theirs.
     ///
     /// Parameters
     /// ----------
@@ -537,7 +267,7 @@ impl PySolid {
     #[pyo3(text_signature = "($self, cells=96, *, threads=None)")]
     fn volume(&self, py: Python<'_>, cells: usize, threads: Threads) -> PyResult<f64> {
         let solid = self.solid.clone();
-        let found = run_watched(py, threads, move |watch| crate::mesh::volume(&solid, cells, watch))??;
+        let found = run_watched(py, threads, move |watch| volume(&solid, cells, watch))?.map_err(refused)?;
         if let Some(doubt) = &found.doubt {
             warn(py, doubt)?;
         }

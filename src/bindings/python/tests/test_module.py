@@ -30,7 +30,8 @@ def test_a_program_says_what_it_has():
     program = rfm.load(EXAMPLES / "pawn.rfm", cx=1.25)
     assert program.solids == ["pawn"] == list(program) and program.scenes == ["drop"] and len(program) == 1
     assert "pawn" in program and "queen" not in program
-    assert program.params["cx"] == (1.25, 0.5, 2.5, "axis of the pawn, x")
+    assert program.params["cx"] == (1.25, 0.5, 2.5, "axis of the pawn, x", None)
+    assert rfm.load("rfm 1\nparam d = 8 mm\nsolid s = sphere(d)").params["d"] == (0.008, None, None, None, "mm")
     assert program.params["cy"].value == 1.5 and list(program.params) == ["cx", "cy", "particles"]
     assert program.path == str(EXAMPLES / "pawn.rfm") and program.text.startswith("rfm 1\n")
     assert rfm.load("rfm 1\nparam a = 1 mm\nsolid s = sphere(a)", a="5 cm")["s"](0, 0, 0) == pytest.approx(0.025)
@@ -72,6 +73,18 @@ def test_a_sheet_too_thin_for_cells_has_its_volume():
     assert shell.volume() == pytest.approx(4 * np.pi * 0.001, rel=0.01)
     wing = rfm.load("rfm 1\nsolid wing = sphere(0.5) or box([0, 0, 0], [4, 4, 0.001])\n")["wing"]
     assert wing.volume() == pytest.approx(0.5236 + 0.0158, rel=0.01)
+
+
+def test_the_volume_is_the_one_that_check_finds(program, tmp_path):
+    # a solid of triangles has the volume of these; coarse meshes of ten plates do not tell how many there are
+    part = EXAMPLES / "parts" / "bracket.stl"
+    (tmp_path / "bracket.stl").write_bytes(part.read_bytes())
+    comb = "any i in 0..10: box([0, 0, i], [9, 9, i + 0.35])"
+    (tmp_path / "s.rfm").write_text(f'rfm 1\nsolid bracket = mesh("bracket.stl", 1 mm)\nsolid comb = {comb}\n')
+    facts = json.loads(program("check", tmp_path / "s.rfm", "--json").stdout)["solids"]
+    solids = rfm.load(tmp_path / "s.rfm")
+    assert solids["bracket"].volume() == pytest.approx(facts[0]["volume"], rel=1e-12)
+    assert solids["comb"].volume() == pytest.approx(10 * 81 * 0.35, rel=0.01)
 
 
 @pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="no pipes with names here")

@@ -69,6 +69,35 @@ def test_particles_are_copies_in_the_order_of_their_making(drop):
     assert stats.kinetic_energy == pytest.approx(kinetic) and drop.bounds.tolist() == [[0, 0, 0], [3, 3, 3]]
 
 
+def test_the_surface_is_that_of_the_program(program, tmp_path, drop):
+    drop.step(30)
+    mesh = drop.surface()
+    assert mesh.closed and len(mesh.triangles) > 100 and mesh.thin_cells == 0 and np.isnan(mesh.max_distance)
+    fluid = len(drop) * drop.spacing**3
+    assert 0.8 * fluid < mesh.volume < 1.3 * fluid and mesh.area > 0.0
+    program("run", EXAMPLES / "pawn.rfm", "-D", "particles=500", "--steps", "30", "-o", tmp_path / "out")
+    program("mesh", tmp_path / "out", "--fluid", "--format", "ply", "-o", tmp_path / "surfaces")
+    written = sorted((tmp_path / "surfaces").glob("*.ply"))[-1]
+    head = open(written, "rb").read(400).decode("latin1")
+    # frames have single precision, so that a vertex may come or go
+    count = int(head.split("element vertex ")[1].split()[0])
+    assert abs(count - len(mesh.vertices)) <= 0.02 * count
+    assert len(drop.surface(cell=0.5 * drop.spacing).triangles) < len(mesh.triangles) / 2
+    mesh.save(tmp_path / "fluid.stl")
+    assert (tmp_path / "fluid.stl").stat().st_size == 84 + 50 * len(mesh.triangles)
+    with pytest.raises(rfm.RfmError, match="lengths above 0"):
+        drop.surface(cell=-1.0)
+    with pytest.raises(rfm.RfmError, match="too small for these particles"):
+        drop.surface(cell=1e-5)
+
+
+def test_the_surface_of_a_fluid_ends_at_walls():
+    tank = rfm.load(TANK).scene()
+    vertices = tank.surface().vertices
+    assert vertices[:, 0].min() == 0.0 and vertices[:, 2].min() == 0.0 and vertices[:, 1].max() == 0.4
+    assert vertices[:, 0].max() == pytest.approx(0.3, abs=0.02)
+
+
 def test_views_show_the_state_and_hold_it(drop):
     drop.step(5)
     views = drop.views()

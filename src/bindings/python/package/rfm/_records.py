@@ -12,9 +12,12 @@ Diagnostic.__doc__ = """A message of the compiler.
 would be accepted, or is None. ``rfm explain CODE`` has more about a code.
 """
 
-Param = namedtuple("Param", ["value", "low", "high", "doc"])
+Param = namedtuple("Param", ["value", "low", "high", "doc", "unit"])
 Param.__module__ = "rfm"
-Param.__doc__ = "A param: its value, the range that the file states (or None), and the text behind it (or None)."
+Param.__doc__ = """A param: its value, the range that the file states (or None), and the text behind it (or None).
+
+Numbers are in SI units; ``unit`` is the one in which the file writes the value, such as ``"mm"``, or None.
+"""
 
 Contact = namedtuple("Contact", ["distance", "normal", "curvature"])
 Contact.__module__ = "rfm"
