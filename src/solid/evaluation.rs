@@ -4,6 +4,7 @@ use std::cell::OnceCell;
 
 use glam::{DVec3, Vec3};
 
+use super::confirm::{Surface, confirmed};
 use super::construction::Solid;
 use super::engine::ProgramKind;
 use super::nearest::{Distance, Distances};
@@ -11,7 +12,8 @@ use super::programs::on_demand::Lane;
 use crate::field::{Field, GradientsMut, Points};
 use crate::geom::Aabb;
 use crate::interval::Interval;
-use crate::ir::Unary;
+use crate::ir::{Kind, Unary};
+use crate::precision::Precision;
 
 /// The surface of a solid as seen from a point, see `ir::contact`: accurate near the surface, an estimate far
 /// away. [`Solid::distance`] is slow and has a proof: a clearance that is never
@@ -29,6 +31,14 @@ pub struct Contact {
 
 /// Velocities along the normal of one face agree more than this (cosine).
 const SAME_FACE: f64 = 0.99;
+
+/// Contacts that are nearer than this part of the coordinates are not compared with signs: their numbers end there. Those in
+/// single precision end sooner.
+pub(super) const SURE: f64 = 1e-9;
+const SURE_F32: f64 = 1e-4;
+
+/// Points of columns that are looked at together, whether one of them has to be compared with signs.
+const LOOKED_AT: usize = 32;
 
 impl Contact {
     /// The place of the surface that was found from a point `p`; the point itself where none was.
@@ -118,8 +128,29 @@ impl Solid {
         if is_lost && self.sign(p).abs() == 1.0 {
             searched_contact(distances.get_or_init(|| Distances::new(self)), p, contact)
         } else {
-            contact
+            self.confirmed_contact(p, contact)
         }
+    }
+
+    /// The contact of which an estimate is given.
+    #[inline]
+    fn confirmed_contact(&self, p: DVec3, estimate: Contact) -> Contact {
+        let trust = self.trust();
+        let Contact { distance, mean_curvature, .. } = estimate;
+        if !trust.is_in_doubt(p, distance, mean_curvature) {
+            return estimate;
+        }
+        confirmed(self, trust, p, estimate, SURE * p.abs().max_element())
+    }
+
+    /// The contact that single leaves gave, of which doubtful ones are compared with their own signs; that of the whole solid
+    /// where the nearest place may be elsewhere.
+    #[inline]
+    pub(super) fn settled(&self, p: DVec3, found: Contact) -> Contact {
+        let trust = self.trust();
+        let is_in_doubt =
+            trust.kind != Kind::Doubtful && trust.is_in_doubt(p, found.distance, found.mean_curvature);
+        if is_in_doubt { self.contact(p) } else { found }
     }
 
     /// The contact that its program finds. Where the derivatives say nothing, its distance is 0.
@@ -169,15 +200,48 @@ impl Solid {
         let [distance, nx, ny, nz, curvature] = out;
         self.evaluate_many(ProgramKind::Contact, points, [distance, nx, ny, nz, curvature]);
         let distances = OnceCell::new();
-        for i in 0..distance.len() {
-            let found = distance[i].to_f64();
-            if found == 0.0 || found.is_nan() {
+        let trust = self.trust();
+        for first in (0..distance.len()).step_by(LOOKED_AT) {
+            let run = first..distance.len().min(first + LOOKED_AT);
+            let is_lost =
+                distance[run.clone()].iter().fold(false, |lost, d| lost | !(d.to_f64().abs() > 0.0));
+            let at = points.map(|column| &column[run.clone()]);
+            if !is_lost && !trust.has_doubts(at, &distance[run.clone()], &curvature[run.clone()]) {
+                continue;
+            }
+            for i in run {
                 let p = DVec3::from_array(points.map(|column| column[i].to_f64()));
-                let Contact { distance: d, normal, mean_curvature } = self.contact_or_search(p, &distances);
-                let row = [d, normal.x, normal.y, normal.z, mean_curvature].map(T::from_f64);
-                [distance[i], nx[i], ny[i], nz[i], curvature[i]] = row;
+                if distance[i].to_f64().abs() > 0.0
+                    && !trust.is_in_doubt(p, distance[i].to_f64(), curvature[i].to_f64())
+                {
+                    continue;
+                }
+                let normal = DVec3::from_array([nx[i], ny[i], nz[i]].map(T::to_f64));
+                let found =
+                    Contact { distance: distance[i].to_f64(), normal, mean_curvature: curvature[i].to_f64() };
+                let contact = self.of_column::<T>(p, found, &distances);
+                if contact != found {
+                    let Contact { distance: d, normal, mean_curvature } = contact;
+                    let row = [d, normal.x, normal.y, normal.z, mean_curvature].map(T::from_f64);
+                    [distance[i], nx[i], ny[i], nz[i], curvature[i]] = row;
+                }
             }
         }
+    }
+
+    /// The contact that replaces one of a column.
+    fn of_column<T: Lane>(&self, p: DVec3, found: Contact, distances: &OnceCell<Distances>) -> Contact {
+        if found.distance == 0.0 || found.distance.is_nan() {
+            return self.contact_or_search(p, distances);
+        }
+        let is_single = T::PRECISION == Precision::F32;
+        if is_single && found.distance.abs() < SURE_F32 * p.abs().max_element() {
+            // what is left of so short a distance in single precision would contradict the signs
+            let estimate = self.estimated_contact(p);
+            let contact = self.confirmed_contact(p, estimate);
+            return if contact == estimate { found } else { contact };
+        }
+        self.confirmed_contact(p, found)
     }
 
     /// Inside (1), on the surface (0) or outside (−1) at many points given by columns, as [`Solid::sign`].
@@ -214,6 +278,26 @@ fn searched_contact(distances: &Distances, p: DVec3, lost: Contact) -> Contact {
         true => Contact { distance: estimate, normal, mean_curvature: 0.0 },
         false if estimate.is_infinite() => Contact { distance: estimate, ..lost },
         false => lost,
+    }
+}
+
+impl Surface for Solid {
+    fn sign(&self, p: DVec3) -> f64 {
+        self.sign(p)
+    }
+
+    fn omega(&self, p: DVec3) -> f64 {
+        self.omega(p)
+    }
+
+    fn estimate(&self, p: DVec3) -> Contact {
+        self.estimated_contact(p)
+    }
+
+    /// At an edge the estimate is that of one face, which ends before its foot: there that face is crossed.
+    fn crosses_a_face(&self, p: DVec3, behind: DVec3) -> bool {
+        let parts = if self.has_many_leaves() { None } else { self.parts() };
+        parts.is_some_and(|parts| parts.leaves.len() > 1 && parts.leaves.is_crossed_between(p, behind))
     }
 }
 

@@ -6,7 +6,7 @@
 //! |---|---|
 //! | `construction`, `evaluation` | [`Solid`], its programs and its values |
 //! | `engine`, `moment` | machine code or the interpreter; a solid at a time, or during a stretch of time |
-//! | `nearest` | distances with proofs |
+//! | `nearest`, `confirm` | distances with proofs; contacts that are compared with the signs around them |
 //! | `twin`, `walls`, `surface`, `depth` | its views: sign, walls of a fluid, the cheapest field, depth |
 //! | `programs` | compiled code, the programs made on demand, programs over blocks of points |
 //! | `leaves` | a solid taken apart into leaves, and what is left of it in a box |
@@ -21,6 +21,7 @@
 
 mod bounds;
 mod cells;
+mod confirm;
 mod construction;
 mod depth;
 mod engine;
