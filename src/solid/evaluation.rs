@@ -115,8 +115,9 @@ impl Solid {
     }
 
     /// Distance, normal and curvature of the surface as seen from a point: accurate near the surface, an
-    /// estimate far away, but never 0 off the surface. Where the derivatives say nothing and no surface is found, as
-    /// beside an empty solid, the distance is infinite.
+    /// estimate far away, but never 0 off the surface. At axes, on creases and in the middle of valleys, where ω and its
+    /// derivatives say little of the distance, the nearest place is looked for by the sign. Where the derivatives say nothing
+    /// and no surface is found, as beside an empty solid, the distance is infinite.
     pub fn contact(&self, p: DVec3) -> Contact {
         self.contact_or_search(p, &OnceCell::new())
     }
@@ -198,7 +199,7 @@ impl Solid {
     /// If the columns differ in length.
     pub fn contact_many<T: Lane>(&self, points: [&[T]; 3], out: [&mut [T]; 5]) {
         let [distance, nx, ny, nz, curvature] = out;
-        self.evaluate_many(ProgramKind::Contact, points, [distance, nx, ny, nz, curvature]);
+        self.estimated_contact_many(points, [distance, nx, ny, nz, curvature]);
         let distances = OnceCell::new();
         let trust = self.trust();
         for first in (0..distance.len()).step_by(LOOKED_AT) {
@@ -227,6 +228,15 @@ impl Solid {
                 }
             }
         }
+    }
+
+    /// What ω and its derivatives alone say of contacts, in the order of [`Solid::contact_many`]: no sign is compared with it, and
+    /// the distance is 0 where the derivatives say nothing. These are the distances of `rfm build`.
+    ///
+    /// # Panics
+    /// If the columns differ in length.
+    pub fn estimated_contact_many<T: Lane>(&self, points: [&[T]; 3], out: [&mut [T]; 5]) {
+        self.evaluate_many(ProgramKind::Contact, points, out);
     }
 
     /// The contact that replaces one of a column.
