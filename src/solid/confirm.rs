@@ -10,7 +10,7 @@ use std::cell::Cell;
 
 use glam::DVec3;
 
-use super::evaluation::Contact;
+use super::contact::Contact;
 use crate::ir::{Trust, is_far_away};
 
 /// A surface between two signs, and the contacts that its formula estimates.

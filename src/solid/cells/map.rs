@@ -23,7 +23,7 @@ use crate::geom::Aabb;
 use crate::interval::Interval;
 use crate::ir::Unary;
 use crate::solid::construction::Solid;
-use crate::solid::evaluation::Contact;
+use crate::solid::contact::Contact;
 use crate::solid::leaves::known_ranges::KnownRanges;
 use crate::solid::leaves::leaf_set::{LeafTree, Leaves};
 use crate::solid::leaves::pruning::Verdict;

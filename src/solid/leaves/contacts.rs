@@ -5,7 +5,7 @@ use glam::DVec3;
 use super::leaf_set::Leaves;
 use crate::ir::Kind;
 use crate::solid::confirm::{Surface, confirmed};
-use crate::solid::evaluation::{Contact, SURE};
+use crate::solid::contact::{Contact, SURE};
 
 /// The surface of a leaf.
 struct LeafSurface<'a> {

@@ -5,7 +5,7 @@ use glam::DVec3;
 use super::leaf_set::Leaves;
 use super::words::Word;
 use crate::field::{Face, Faces, Part};
-use crate::solid::evaluation::Contact;
+use crate::solid::contact::Contact;
 
 impl Leaves {
     /// Adds the faces of the tree that begins at `first`, unless all that it describes is farther away than

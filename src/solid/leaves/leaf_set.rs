@@ -18,8 +18,8 @@ use crate::field::{Path, Sheet};
 use crate::geom::Aabb;
 use crate::interval::Interval;
 use crate::ir::{Contractor, Enclosure, Expr, Graph, Region, SURFACE_ROUNDING, Trust, Wanted};
+use crate::solid::contact::Contact;
 use crate::solid::engine::Engine;
-use crate::solid::evaluation::Contact;
 
 struct Leaf {
     shape: u32,
