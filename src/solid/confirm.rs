@@ -251,7 +251,7 @@ impl<S: Surface> Rays<'_, S> {
             let way = foot - self.p;
             let aside = way - way.dot(there.normal) * there.normal;
             let (length, missed) = (way.length(), aside.length() + there.distance.abs());
-            if !(length < limit) {
+            if length.is_nan() || length >= limit {
                 return None;
             }
             if missed <= MISSED * length {

@@ -91,8 +91,7 @@ impl Solid {
     /// The contact at a point. `distances` are prepared when a search is first needed.
     fn contact_or_search(&self, p: DVec3, distances: &OnceCell<Distances>) -> Contact {
         let contact = self.estimated_contact(p);
-        let is_lost = contact.distance == 0.0 || contact.distance.is_nan();
-        if is_lost && self.sign(p).abs() == 1.0 {
+        if says_nothing(contact.distance) && self.sign(p).abs() == 1.0 {
             searched_contact(distances.get_or_init(|| Distances::new(self)), p, contact)
         } else {
             self.confirmed_contact(p, contact)
@@ -170,15 +169,14 @@ impl Solid {
         let trust = self.trust();
         for first in (0..distance.len()).step_by(LOOKED_AT) {
             let run = first..distance.len().min(first + LOOKED_AT);
-            let is_lost =
-                distance[run.clone()].iter().fold(false, |lost, d| lost | !(d.to_f64().abs() > 0.0));
+            let is_lost = distance[run.clone()].iter().any(|distance| says_nothing(distance.to_f64()));
             let at = points.map(|column| &column[run.clone()]);
             if !is_lost && !trust.has_doubts(at, &distance[run.clone()], &curvature[run.clone()]) {
                 continue;
             }
             for i in run {
                 let p = DVec3::from_array(points.map(|column| column[i].to_f64()));
-                if distance[i].to_f64().abs() > 0.0
+                if !says_nothing(distance[i].to_f64())
                     && !trust.is_in_doubt(p, distance[i].to_f64(), curvature[i].to_f64())
                 {
                     continue;
@@ -207,7 +205,7 @@ impl Solid {
 
     /// The contact that replaces one of a column.
     fn of_column<T: Lane>(&self, p: DVec3, found: Contact, distances: &OnceCell<Distances>) -> Contact {
-        if found.distance == 0.0 || found.distance.is_nan() {
+        if says_nothing(found.distance) {
             return self.contact_or_search(p, distances);
         }
         let is_single = T::PRECISION == Precision::F32;
@@ -243,6 +241,12 @@ impl Solid {
     pub fn range(&self, over: &Aabb) -> Interval {
         self.inner.omega.range(self.inner.engine, over, &self.moment, false)
     }
+}
+
+/// Whether an estimated distance is none: the derivatives vanish, or are no numbers.
+#[inline]
+fn says_nothing(distance: f64) -> bool {
+    distance == 0.0 || distance.is_nan()
 }
 
 /// The contact with the nearest point of the surface, of whose curvature nothing is known. Where no surface is found it

@@ -132,13 +132,13 @@ impl Trust {
         let point = |i: usize| DVec3::new(x[i].to_f64(), y[i].to_f64(), z[i].to_f64());
         let mut found = self.kind == Kind::Doubtful;
         for crease in &self.creases {
-            for i in 0..distance.len() {
-                found |= is_zero(crease.first, point(i), distance[i].to_f64());
+            for (i, distance) in distance.iter().enumerate() {
+                found |= is_zero(crease.first, point(i), distance.to_f64());
             }
         }
         if self.kind == Kind::Bent {
-            for i in 0..distance.len() {
-                found |= bends_around(point(i), distance[i].to_f64(), curvature[i].to_f64());
+            for (i, (distance, curvature)) in distance.iter().zip(curvature).enumerate() {
+                found |= bends_around(point(i), distance.to_f64(), curvature.to_f64());
             }
         }
         found
@@ -376,7 +376,7 @@ fn bends_evenly(graph: &Graph, leaf: Node) -> bool {
         out[0]
     };
     let at_origin = value(DVec3::ZERO);
-    let along = DVec3::AXES.map(|axis| value(axis));
+    let along = DVec3::AXES.map(&value);
     let bend = |i: usize, j: usize| {
         let (a, b) = (DVec3::AXES[i], DVec3::AXES[j]);
         value(a + b) - along[i] - along[j] + at_origin
