@@ -17,6 +17,9 @@ pub struct Interval {
     pub hi: f64,
 }
 
+/// Neighbours that are gone through one by one.
+const MOST_STEPS: u32 = 1000;
+
 impl Interval {
     /// All reals, and possibly NaN: nothing is known.
     pub const ALL: Self = Self { lo: f64::NEG_INFINITY, hi: f64::INFINITY };
@@ -55,6 +58,9 @@ impl Interval {
     /// that a widened bound never loses a sign.
     #[must_use]
     pub fn widened(self, ulps: u32) -> Self {
+        if ulps > MOST_STEPS {
+            return self.widened_at_once(f64::from(ulps));
+        }
         let (mut lo, mut hi) = (self.lo, self.hi);
         for _ in 0..ulps {
             if lo != 0.0 {
@@ -65,6 +71,20 @@ impl Interval {
             }
         }
         Self::new(lo, hi)
+    }
+
+    /// The same for many neighbours, or up to twice as many: none is farther than that part of the number, or the smallest number.
+    fn widened_at_once(self, ulps: f64) -> Self {
+        let step = |end: f64| match end.is_finite() {
+            true => ulps * (f64::EPSILON * end.abs() + f64::from_bits(1)),
+            false => 0.0,
+        };
+        let (lo, hi) = (self.lo - step(self.lo), self.hi + step(self.hi));
+        // beyond zero no end goes
+        Self::new(
+            if self.lo >= 0.0 { lo.max(0.0) } else { lo },
+            if self.hi <= 0.0 { hi.min(0.0) } else { hi },
+        )
     }
 
     /// The interval with its ends one neighbour further out. That includes zeros, because a result that was
@@ -226,6 +246,20 @@ impl Div for Interval {
 mod tests {
     use super::*;
     use proptest::prelude::*;
+
+    #[test]
+    fn many_neighbours_are_as_far_as_one_by_one() {
+        for (lo, hi) in [(1.0, 2.0), (-3e300, -1e-300), (5e-324, 7e-310), (0.0, f64::MAX), (-7.1, 0.0)] {
+            let of = Interval::new(lo, hi);
+            let one_by_one = (0..5).fold(of, |of, _| of.widened(MOST_STEPS));
+            let (at_once, twice) = (of.widened(5 * MOST_STEPS), one_by_one.widened(5 * MOST_STEPS));
+            assert!(
+                at_once.lo <= one_by_one.lo && one_by_one.hi <= at_once.hi,
+                "{at_once:?}, {one_by_one:?}"
+            );
+            assert!(twice.lo <= at_once.lo && at_once.hi <= twice.hi, "{at_once:?}, {twice:?}");
+        }
+    }
 
     fn interval() -> impl Strategy<Value = Interval> {
         (-10.0..10.0f64, 0.0..5.0f64).prop_map(|(lo, width)| Interval::new(lo, lo + width))

@@ -353,8 +353,8 @@ pub(super) struct Build {
 pub(super) enum BuildWhat {
     /// 1 inside, 0 on the surface, −1 outside
     Sign,
-    /// Distance from the surface, positive outside: accurate near a face, an estimate far away, 0 where nothing is
-    /// known
+    /// Distance from the surface, positive outside: accurate near a face, an estimate far away, which no sign confirms, 0
+    /// where nothing is known
     Distance,
 }
 

@@ -13,7 +13,7 @@ use super::programs::ranges::Ranges;
 use crate::codegen::{CodegenError, Form, Forms};
 use crate::geom::{Aabb, Placement, Twist};
 use crate::interval::Interval;
-use crate::ir::{self, Graph, Node, RigidMotion, Uniforms};
+use crate::ir::{self, Graph, Node, RigidMotion, Trust, Uniforms};
 use crate::precision::Precision;
 use crate::simplify::{Applied, simplify, simplify_with_hulls};
 
@@ -35,6 +35,7 @@ pub(super) struct Inner {
     /// Same sign, no roots.
     twin: OnceLock<Function>,
     contact: OnceLock<Programs>,
+    trust: OnceLock<Trust>,
     velocity: OnceLock<Programs>,
     motion: OnceLock<Option<RigidMotion>>,
     parts: OnceLock<Option<LeavesAtAllTimes>>,
@@ -137,6 +138,7 @@ impl Solid {
             omega: Function::new(graph, roots[0], Guard::Infinite, form),
             twin: OnceLock::new(),
             contact: OnceLock::new(),
+            trust: OnceLock::new(),
             velocity: OnceLock::new(),
             motion: OnceLock::new(),
             parts: OnceLock::new(),
@@ -149,6 +151,12 @@ impl Solid {
             solid.inner.omega.value.require_machine_code()?;
         }
         Ok(solid)
+    }
+
+    /// How far the estimates of its contacts can be trusted.
+    pub(super) fn trust(&self) -> &Trust {
+        let Function { graph, root, .. } = &self.inner.omega;
+        self.inner.trust.get_or_init(|| Trust::of(graph, *root))
     }
 
     /// Whether time occurs in the formula.

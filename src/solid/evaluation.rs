@@ -4,47 +4,23 @@ use std::cell::OnceCell;
 
 use glam::{DVec3, Vec3};
 
+use super::confirm::{Surface, confirmed};
 use super::construction::Solid;
+use super::contact::{Contact, SURE};
 use super::engine::ProgramKind;
 use super::nearest::{Distance, Distances};
 use super::programs::on_demand::Lane;
 use crate::field::{Field, GradientsMut, Points};
 use crate::geom::Aabb;
 use crate::interval::Interval;
-use crate::ir::Unary;
+use crate::ir::{Kind, Unary};
+use crate::precision::Precision;
 
-/// The surface of a solid as seen from a point, see `ir::contact`: accurate near the surface, an estimate far
-/// away. [`Solid::distance`] is slow and has a proof: a clearance that is never
-/// too long, beside an estimate.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Contact {
-    /// Length, positive in the fluid, negative inside the solid.
-    pub distance: f64,
-    /// Outward unit normal of the face that is nearest; the mean of two at an edge; zero where there is none.
-    pub normal: DVec3,
-    /// Mean curvature of that face in 1/length, positive where the solid is convex: 1/R for a ball, 1/2R for
-    /// a cylinder.
-    pub mean_curvature: f64,
-}
+/// The same for numbers in single precision.
+const SURE_F32: f64 = 1e-4;
 
-/// Velocities along the normal of one face agree more than this (cosine).
-const SAME_FACE: f64 = 0.99;
-
-impl Contact {
-    /// The place of the surface that was found from a point `p`; the point itself where none was.
-    pub fn foot(&self, p: DVec3) -> DVec3 {
-        let foot = p - self.distance * self.normal;
-        if foot.is_finite() { foot } else { p }
-    }
-
-    /// The velocity of the face that was found from `p`, by a formula for that of the nearest face along its normal. Before
-    /// an edge, where another face may be the nearest to the foot, it is that at `p`.
-    pub(in crate::solid) fn velocity_at_foot(&self, p: DVec3, velocity: impl Fn(DVec3) -> DVec3) -> DVec3 {
-        let [here, there] = [p, self.foot(p)].map(velocity);
-        let is_same_face = here.dot(there) >= SAME_FACE * here.length() * there.length();
-        if is_same_face { there } else { here }
-    }
-}
+/// Points of columns that are looked at together, whether one of them has to be compared with signs.
+const LOOKED_AT: usize = 32;
 
 impl Solid {
     /// ω at a point.
@@ -105,8 +81,9 @@ impl Solid {
     }
 
     /// Distance, normal and curvature of the surface as seen from a point: accurate near the surface, an
-    /// estimate far away, but never 0 off the surface. Where the derivatives say nothing and no surface is found, as
-    /// beside an empty solid, the distance is infinite.
+    /// estimate far away, but never 0 off the surface. At axes, on creases and in the middle of valleys, where ω and its
+    /// derivatives say little of the distance, the nearest place is looked for by the sign. Where the derivatives say nothing
+    /// and no surface is found, as beside an empty solid, the distance is infinite.
     pub fn contact(&self, p: DVec3) -> Contact {
         self.contact_or_search(p, &OnceCell::new())
     }
@@ -114,12 +91,32 @@ impl Solid {
     /// The contact at a point. `distances` are prepared when a search is first needed.
     fn contact_or_search(&self, p: DVec3, distances: &OnceCell<Distances>) -> Contact {
         let contact = self.estimated_contact(p);
-        let is_lost = contact.distance == 0.0 || contact.distance.is_nan();
-        if is_lost && self.sign(p).abs() == 1.0 {
+        if says_nothing(contact.distance) && self.sign(p).abs() == 1.0 {
             searched_contact(distances.get_or_init(|| Distances::new(self)), p, contact)
         } else {
-            contact
+            self.confirmed_contact(p, contact)
         }
+    }
+
+    /// The contact of which an estimate is given.
+    #[inline]
+    fn confirmed_contact(&self, p: DVec3, estimate: Contact) -> Contact {
+        let trust = self.trust();
+        let Contact { distance, mean_curvature, .. } = estimate;
+        if !trust.is_in_doubt(p, distance, mean_curvature) {
+            return estimate;
+        }
+        confirmed(self, trust, p, estimate, SURE * p.abs().max_element())
+    }
+
+    /// The contact that single leaves gave, of which doubtful ones are compared with their own signs; that of the whole solid
+    /// where the nearest place may be elsewhere.
+    #[inline]
+    pub(super) fn settled(&self, p: DVec3, found: Contact) -> Contact {
+        let trust = self.trust();
+        let is_in_doubt =
+            trust.kind != Kind::Doubtful && trust.is_in_doubt(p, found.distance, found.mean_curvature);
+        if is_in_doubt { self.contact(p) } else { found }
     }
 
     /// The contact that its program finds. Where the derivatives say nothing, its distance is 0.
@@ -167,17 +164,58 @@ impl Solid {
     /// If the columns differ in length.
     pub fn contact_many<T: Lane>(&self, points: [&[T]; 3], out: [&mut [T]; 5]) {
         let [distance, nx, ny, nz, curvature] = out;
-        self.evaluate_many(ProgramKind::Contact, points, [distance, nx, ny, nz, curvature]);
+        self.estimated_contact_many(points, [distance, nx, ny, nz, curvature]);
         let distances = OnceCell::new();
-        for i in 0..distance.len() {
-            let found = distance[i].to_f64();
-            if found == 0.0 || found.is_nan() {
+        let trust = self.trust();
+        for first in (0..distance.len()).step_by(LOOKED_AT) {
+            let run = first..distance.len().min(first + LOOKED_AT);
+            let is_lost = distance[run.clone()].iter().any(|distance| says_nothing(distance.to_f64()));
+            let at = points.map(|column| &column[run.clone()]);
+            if !is_lost && !trust.has_doubts(at, &distance[run.clone()], &curvature[run.clone()]) {
+                continue;
+            }
+            for i in run {
                 let p = DVec3::from_array(points.map(|column| column[i].to_f64()));
-                let Contact { distance: d, normal, mean_curvature } = self.contact_or_search(p, &distances);
-                let row = [d, normal.x, normal.y, normal.z, mean_curvature].map(T::from_f64);
-                [distance[i], nx[i], ny[i], nz[i], curvature[i]] = row;
+                if !says_nothing(distance[i].to_f64())
+                    && !trust.is_in_doubt(p, distance[i].to_f64(), curvature[i].to_f64())
+                {
+                    continue;
+                }
+                let normal = DVec3::from_array([nx[i], ny[i], nz[i]].map(T::to_f64));
+                let found =
+                    Contact { distance: distance[i].to_f64(), normal, mean_curvature: curvature[i].to_f64() };
+                let contact = self.of_column::<T>(p, found, &distances);
+                if contact != found {
+                    let Contact { distance: d, normal, mean_curvature } = contact;
+                    let row = [d, normal.x, normal.y, normal.z, mean_curvature].map(T::from_f64);
+                    [distance[i], nx[i], ny[i], nz[i], curvature[i]] = row;
+                }
             }
         }
+    }
+
+    /// What ω and its derivatives alone say of contacts, in the order of [`Solid::contact_many`]: no sign is compared with it, and
+    /// the distance is 0 where the derivatives say nothing. These are the distances of `rfm build`.
+    ///
+    /// # Panics
+    /// If the columns differ in length.
+    pub fn estimated_contact_many<T: Lane>(&self, points: [&[T]; 3], out: [&mut [T]; 5]) {
+        self.evaluate_many(ProgramKind::Contact, points, out);
+    }
+
+    /// The contact that replaces one of a column.
+    fn of_column<T: Lane>(&self, p: DVec3, found: Contact, distances: &OnceCell<Distances>) -> Contact {
+        if says_nothing(found.distance) {
+            return self.contact_or_search(p, distances);
+        }
+        let is_single = T::PRECISION == Precision::F32;
+        if is_single && found.distance.abs() < SURE_F32 * p.abs().max_element() {
+            // what is left of so short a distance in single precision would contradict the signs
+            let estimate = self.estimated_contact(p);
+            let contact = self.confirmed_contact(p, estimate);
+            return if contact == estimate { found } else { contact };
+        }
+        self.confirmed_contact(p, found)
     }
 
     /// Inside (1), on the surface (0) or outside (−1) at many points given by columns, as [`Solid::sign`].
@@ -205,6 +243,12 @@ impl Solid {
     }
 }
 
+/// Whether an estimated distance is none: the derivatives vanish, or are no numbers.
+#[inline]
+fn says_nothing(distance: f64) -> bool {
+    distance == 0.0 || distance.is_nan()
+}
+
 /// The contact with the nearest point of the surface, of whose curvature nothing is known. Where no surface is found it
 /// is infinitely far, and the rest stays that of `lost`.
 fn searched_contact(distances: &Distances, p: DVec3, lost: Contact) -> Contact {
@@ -214,6 +258,26 @@ fn searched_contact(distances: &Distances, p: DVec3, lost: Contact) -> Contact {
         true => Contact { distance: estimate, normal, mean_curvature: 0.0 },
         false if estimate.is_infinite() => Contact { distance: estimate, ..lost },
         false => lost,
+    }
+}
+
+impl Surface for Solid {
+    fn sign(&self, p: DVec3) -> f64 {
+        self.sign(p)
+    }
+
+    fn omega(&self, p: DVec3) -> f64 {
+        self.omega(p)
+    }
+
+    fn estimate(&self, p: DVec3) -> Contact {
+        self.estimated_contact(p)
+    }
+
+    /// At an edge the estimate is that of one face, which ends before its foot: there that face is crossed.
+    fn crosses_a_face(&self, p: DVec3, behind: DVec3) -> bool {
+        let parts = if self.has_many_leaves() { None } else { self.parts() };
+        parts.is_some_and(|parts| parts.leaves.len() > 1 && parts.leaves.is_crossed_between(p, behind))
     }
 }
 

@@ -4,9 +4,9 @@
 //!
 //! | file or folder | what it holds |
 //! |---|---|
-//! | `construction`, `evaluation` | [`Solid`], its programs and its values |
+//! | `construction`, `evaluation`, `contact` | [`Solid`], its programs and its values |
 //! | `engine`, `moment` | machine code or the interpreter; a solid at a time, or during a stretch of time |
-//! | `nearest` | distances with proofs |
+//! | `nearest`, `confirm` | distances with proofs; contacts that are compared with the signs around them |
 //! | `twin`, `walls`, `surface`, `depth` | its views: sign, walls of a fluid, the cheapest field, depth |
 //! | `programs` | compiled code, the programs made on demand, programs over blocks of points |
 //! | `leaves` | a solid taken apart into leaves, and what is left of it in a box |
@@ -21,7 +21,9 @@
 
 mod bounds;
 mod cells;
+mod confirm;
 mod construction;
+mod contact;
 mod depth;
 mod engine;
 mod evaluation;
@@ -43,9 +45,9 @@ pub use bounds::unbounded::Unbounded;
 pub use cells::map::{CellMap, CellStats, Place};
 pub use cells::moving::MovingMap;
 pub use construction::Solid;
+pub use contact::Contact;
 pub use depth::Depth;
 pub use engine::{Engine, ProgramKind};
-pub use evaluation::Contact;
 pub use inspection::{LeafInfo, Remainder};
 pub use lints::{Break, Breakage, Idle, ThinPart, Uneven};
 pub use nearest::{Distance, Distances};

@@ -3,7 +3,7 @@
 use glam::DVec3;
 
 use super::construction::Solid;
-use super::evaluation::Contact;
+use super::contact::Contact;
 use crate::field::{Entry, Face, Faces, Moving, Part, Path, Walls};
 use crate::geom::Placement;
 

@@ -44,7 +44,8 @@ impl Question {
             Self::Distance => {
                 "distance from the surface, positive outside: accurate near a face, an estimate far away, and 0 \
                  where no derivative tells anything; too small by up to 1 - sin(a/2) of it before an edge of the angle a \
-                 (29 % at a right angle, more at an acute one), and by more before a corner (42 % at that of a box)"
+                 (29 % at a right angle, more at an acute one), and by more before a corner (42 % at that of a box); at an \
+                 axis and on a crease of the formula it may be far off, where rfm itself compares it with signs"
             }
         }
     }

@@ -1,7 +1,8 @@
 //! The contact program against closed forms and, for the pawn, against the nearest point of its profile.
 
+use rfm::geom::Aabb;
 use rfm::glam::{DVec2, DVec3};
-use rfm::solid::Distances;
+use rfm::solid::{CellMap, Distances};
 use rfm::{Engine, Program, Solid};
 
 use crate::random::Random;
@@ -208,4 +209,99 @@ fn pawn_distances_far_from_the_wall() {
         errors[p95], gaps[p95]
     );
     assert!(errors[p95] < 5e-3 && gaps[p95] < 1e-2, "{} {}", errors[p95], gaps[p95]);
+}
+
+/// Where the slope of a formula has no end, or is that of another branch, or is zero, value over slope would be a thousandth of
+/// the distance, or a million times as much: around the axis of an angle, on the crease of a root, in the middle of a valley.
+#[test]
+fn contacts_at_axes_and_creases_are_as_far_as_the_surface() {
+    let star = "abs(x)^0.5 + abs(y)^0.5 + abs(z)^0.5 <= 1";
+    let lens = "sqrt(abs(x)) + y^2 + z^2 <= 1";
+    let flower = "0.5 - abs(hypot(x, y) - 2 - 0.3*cos(3*atan2(y, x)))";
+    let column = "hypot(x, y) <= 1 + 0.2*cos(5*atan2(y, x)) and 0 <= z <= 1";
+    let bent = "box([-1,-0.2,-0.3],[1,0.2,0.3]).bend(1.5)";
+    let octahedron = "abs(x) + abs(y) + abs(z) <= 1";
+    let blended = "blend(sphere(1), box([-2,-0.2,-0.2],[2,0.2,0.2]), 0.3)";
+    let (valley, flat_valley) = ("z <= x^2", "z <= x^4");
+    let (rounded, bell) = ("x^8 + y^8 + z^8 <= 1", "exp(-(x^2 + y^2 + z^2)) >= 0.5");
+    let ring = "(x^2 + y^2 + z^2 + 1 - 0.0625)^2 <= 4*(x^2 + y^2)";
+    let bell_radius = 2_f64.ln().sqrt();
+    for (definition, p, distance, normal) in [
+        // the tips lie on the axes, the hollows where the coordinates are equal: 3√t = 1
+        (star, [0.0, 0.0, 1.1], 0.1, None),
+        (star, [1e-9, 0.0, 1.1], 0.1, None),
+        (star, [0.0, 0.0, 0.0], -(3_f64.sqrt() / 9.0), None),
+        (lens, [0.0, 1.1, 0.0], 0.1, Some(DVec3::Y)),
+        (lens, [1e-9, 1.1, 0.0], 0.1, Some(DVec3::Y)),
+        // 1.5 + 0.3 cos 3θ is 1.2 at least
+        (flower, [0.0, 0.0, 0.0], 1.2, None),
+        (flower, [1e-9, 0.0, 0.0], 1.2, None),
+        (column, [0.0, 0.0, 0.4], -0.4, Some(-DVec3::Z)),
+        // the plate is a sector of the ring between 1.2 and 1.8 from the axis
+        (bent, [0.0, 0.0, 1.5], 1.2, None),
+        (octahedron, [0.0, 0.0, 2.0], 1.0, Some(DVec3::Z)),
+        ("z <= abs(x)", [0.0, 0.0, -1.0], -1.0, Some(DVec3::Z)),
+        ("cone(1, 2)", [0.0, 0.0, 3.0], 1.0, Some(DVec3::Z)),
+        (blended, [0.0, 0.0, 0.0], -1.0, None),
+        // d² = x² + (z − x²)² is least where 2x² = 2z − 1
+        (valley, [0.0, 0.0, 5.0], 4.75_f64.sqrt(), None),
+        (valley, [1e-3, 0.0, 2.0], 1.75_f64.sqrt(), None),
+        (flat_valley, [0.0, 0.0, 2.0], 1.175_348, None),
+        ("ellipsoid(10, 0.5, 0.2)", [0.0, 0.0, 0.0], -0.2, None),
+        ("ellipsoid(10, 0.5, 0.2)", [5.0, 0.0, 0.0], -0.173_194, None),
+        ("x*y >= 1", [1e-9, 0.0, 0.0], 2_f64.sqrt(), None),
+        (rounded, [1e-3, 0.0, 0.0], -0.999, None),
+        (rounded, [0.0, 0.0, 1.2], 0.2, Some(DVec3::Z)),
+        (bell, [0.0, 0.0, 4.0], 4.0 - bell_radius, Some(DVec3::Z)),
+        (bell, [10.0, 0.0, 0.0], 10.0 - bell_radius, Some(DVec3::X)),
+        (ring, [0.0, 0.0, 0.0], 0.75, None),
+        (ring, [0.0, 0.0, 0.5], 1.25_f64.sqrt() - 0.25, None),
+    ] {
+        let (solid, p) = (solid(definition), DVec3::from_array(p));
+        let found = solid.contact(p);
+        let context = || format!("{definition} at {p}: {found:?}, expected {distance}");
+        assert!((found.distance - distance).abs() < 0.02 * distance.abs(), "{}", context());
+        assert!(normal.is_none_or(|normal| found.normal.distance(normal) < 0.1), "{}", context());
+        assert!((found.normal.length() - 1.0).abs() < 1e-9, "{}", context());
+        let mut columns = [[0.0]; 5];
+        let [d, x, y, z, k] = &mut columns;
+        solid.contact_many([&[p.x], &[p.y], &[p.z]], [d, x, y, z, k]);
+        let expected = [found.distance, found.normal.x, found.normal.y, found.normal.z, found.mean_curvature];
+        assert_eq!(columns.map(|column| column[0]), expected, "{}", context());
+        let single = p.as_vec3();
+        let mut columns = [[0_f32]; 5];
+        let [d, x, y, z, k] = &mut columns;
+        solid.contact_many([&[single.x], &[single.y], &[single.z]], [d, x, y, z, k]);
+        let error = (f64::from(columns[0][0]) - distance).abs();
+        assert!(error < 0.02 * distance.abs(), "{} in single precision: {columns:?}", context());
+    }
+}
+
+/// The fluid asks a map of cells, which knows single leaves.
+#[test]
+fn contacts_of_particles_at_axes_are_as_far_as_the_surface() {
+    for (definition, p, distance) in [
+        ("abs(x)^0.5 + abs(y)^0.5 + abs(z)^0.5 <= 1", [0.0, 0.0, 1.1], 0.1),
+        ("sqrt(abs(x)) + y^2 + z^2 <= 1", [0.0, 1.1, 0.0], 0.1),
+        ("hypot(x, y) <= 0.2 + 0.04*cos(5*atan2(y, x)) and -1 <= z <= 1", [0.0, 0.0, 0.5], -0.16),
+    ] {
+        let (solid, p) = (solid(definition), DVec3::from_array(p));
+        let over = Aabb::new(DVec3::splat(-2.0), DVec3::splat(2.0));
+        let map = CellMap::with_reach(&solid, over, 0.5).unwrap();
+        let found = map.contact(p);
+        assert!((found.distance - distance).abs() < 0.02 * distance.abs(), "{definition}: {found:?}");
+    }
+}
+
+/// The estimate of a face that ends at an edge, as of every box, is the distance of that face.
+#[test]
+fn contacts_at_edges_stay_estimates() {
+    for (definition, p, distance) in [
+        ("box([-1,-1,-1],[1,1,1])", [2.0, 2.5, 0.0], 1.5),
+        ("box([-0.5,-0.1,0],[0.5,0.1,2]).twist(0.25)", [1.0, 1.0, 2.3], 0.853_321_415_877_888_6),
+        ("box([-0.5,-0.1,0],[0.5,0.1,2]).twist(0.25)", [0.2, 0.9, -0.4], 0.572_085_262_523_292_7),
+    ] {
+        let found = solid(definition).contact(DVec3::from_array(p));
+        assert!((found.distance - distance).abs() < 1e-12, "{definition}: {found:?}");
+    }
 }

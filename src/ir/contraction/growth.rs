@@ -189,8 +189,7 @@ impl Growth {
 
     /// A whole power, which is above zero.
     pub fn to_the(self, exponent: u32, scales: Scales) -> Self {
-        let factor =
-            forward::power(self.factor, exponent).widened(ROUNDING.saturating_mul(exponent).min(999));
+        let factor = forward::power(self.factor, exponent).widened(ROUNDING.saturating_mul(exponent));
         Self::with(self.degree * f64::from(exponent), factor, &[self], scales)
     }
 
@@ -258,7 +257,17 @@ impl Growth {
 
 #[cfg(test)]
 mod tests {
-    use super::Scales;
+    use super::{Growth, Interval, Scales};
+
+    /// Programs round once for each factor.
+    #[test]
+    fn powers_above_a_thousand_are_as_uncertain_as_all_their_factors() {
+        let exponent = 60_000;
+        let base = Growth::number(Interval::point(1.0001));
+        let power = base.to_the(exponent, Scales { from: 1.0, to: 2.0 }).factor;
+        let uncertain = power.hi / power.lo - 1.0;
+        assert!(uncertain > 8.0 * f64::from(exponent) * f64::EPSILON && uncertain < 1e-9, "{uncertain}");
+    }
 
     /// With a power that is exactly zero 10⁴⁰ − (x/1000)¹⁰⁰ would end at 2048, where it is still positive.
     #[test]

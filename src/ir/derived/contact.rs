@@ -18,7 +18,7 @@
 //! The surface of a leaf that depends on time moves along its outward normal n with the speed u_t/|∇u|: on
 //! u(x(t), t) = 0 the derivative ∇u·x′ + u_t vanishes, and n = −∇u/|∇u|.
 
-use rustc_hash::FxHashMap;
+use rustc_hash::{FxHashMap, FxHashSet};
 
 use crate::ir::derived::gradient::{gradient, gradient_and_rate};
 use crate::ir::derived::sign::SignRule;
@@ -92,6 +92,49 @@ impl Kind {
     }
 }
 
+/// How a node is made of shapes.
+fn kind(graph: &Graph, node: Node) -> Kind {
+    match SignRule::of(graph, node) {
+        SignRule::Leaf => product(graph, node).unwrap_or(Kind::Signs(SignRule::Leaf)),
+        rule => Kind::Signs(rule),
+    }
+}
+
+/// What becomes of a product; `None` for other formulas, and where a factor is a number.
+fn product(graph: &Graph, node: Node) -> Option<Kind> {
+    let Expr::Binary(Binary::Mul, p, q) = graph.expr(node) else { return None };
+    let is_number =
+        |node| matches!(graph.expr(node), Expr::Constant(_) | Expr::Parameter(_) | Expr::Uniform(_));
+    if p == q || is_number(p) || is_number(q) {
+        return None;
+    }
+    let varies = |node| Axis::SPACE.iter().any(|&axis| graph.uses(node, axis));
+    match (varies(p), varies(q)) {
+        (true, true) => Some(Kind::Product(p, q)),
+        (false, true) => Some(Kind::Scaled { factor: p, shape: q }),
+        (true, false) => Some(Kind::Scaled { factor: q, shape: p }),
+        (false, false) => None,
+    }
+}
+
+/// The formulas below a root whose surfaces [`contact`] estimates; at most `most`, and `None` if there are more.
+pub fn leaves(graph: &Graph, root: Node, most: usize) -> Option<Vec<Node>> {
+    let (mut waiting, mut seen, mut found) = (vec![root], FxHashSet::default(), Vec::new());
+    while let Some(node) = waiting.pop() {
+        if !seen.insert(node) {
+            continue;
+        }
+        match kind(graph, node) {
+            Kind::Signs(SignRule::Leaf) => found.push(node),
+            joined => waiting.extend(joined.operands()),
+        }
+        if found.len() > most {
+            return None;
+        }
+    }
+    Some(found)
+}
+
 impl Builder<'_> {
     /// Logic nodes below the root in an order in which operands come first: no recursion, trees may be deep.
     fn surface(&mut self, root: Node) -> Surface {
@@ -101,7 +144,7 @@ impl Builder<'_> {
                 stack.pop();
                 continue;
             }
-            let kind = self.kind(node);
+            let kind = kind(self.graph, node);
             let missing: Vec<Node> = kind.operands().filter(|o| !self.known.contains_key(o)).collect();
             if missing.is_empty() {
                 let surface = self.combine(node, kind);
@@ -112,30 +155,6 @@ impl Builder<'_> {
             }
         }
         self.known[&root]
-    }
-
-    fn kind(&self, node: Node) -> Kind {
-        match SignRule::of(self.graph, node) {
-            SignRule::Leaf => self.product(node).unwrap_or(Kind::Signs(SignRule::Leaf)),
-            rule => Kind::Signs(rule),
-        }
-    }
-
-    /// What becomes of a product; `None` for other formulas, and where a factor is a number.
-    fn product(&self, node: Node) -> Option<Kind> {
-        let Expr::Binary(Binary::Mul, p, q) = self.graph.expr(node) else { return None };
-        let is_number =
-            |node| matches!(self.graph.expr(node), Expr::Constant(_) | Expr::Parameter(_) | Expr::Uniform(_));
-        if p == q || is_number(p) || is_number(q) {
-            return None;
-        }
-        let varies = |node| Axis::SPACE.iter().any(|&axis| self.graph.uses(node, axis));
-        match (varies(p), varies(q)) {
-            (true, true) => Some(Kind::Product(p, q)),
-            (false, true) => Some(Kind::Scaled { factor: p, shape: q }),
-            (true, false) => Some(Kind::Scaled { factor: q, shape: p }),
-            (false, false) => None,
-        }
     }
 
     fn combine(&mut self, node: Node, kind: Kind) -> Surface {

@@ -8,4 +8,5 @@ pub mod hoisted;
 pub mod localised;
 pub mod rigid;
 pub mod sign;
+pub mod trust;
 pub mod twin;

@@ -23,7 +23,7 @@ use crate::geom::Aabb;
 use crate::interval::Interval;
 use crate::ir::Unary;
 use crate::solid::construction::Solid;
-use crate::solid::evaluation::Contact;
+use crate::solid::contact::Contact;
 use crate::solid::leaves::known_ranges::KnownRanges;
 use crate::solid::leaves::leaf_set::{LeafTree, Leaves};
 use crate::solid::leaves::pruning::Verdict;
@@ -199,7 +199,7 @@ impl CellMap {
         let found = match self.cells.find(p).map(|found| found.cell) {
             Some(Known::Fluid) => return beyond(1.0),
             Some(Known::Inside) => return beyond(-1.0),
-            Some(Known::Near(words)) => self.nearest(words, &mut 0, p).contact(),
+            Some(Known::Near(words)) => self.solid.settled(p, self.nearest(words, &mut 0, p).contact()),
             _ => self.solid.contact(p),
         };
         if found.distance.abs() >= self.reach { beyond(found.distance.signum()) } else { found }
@@ -385,9 +385,9 @@ impl CellMap {
 
 impl Nearest {
     #[inline]
-    fn of(leaf: u32, [distance, x, y, z, mean_curvature]: [f64; 5], negated: bool) -> Self {
+    fn of(leaf: u32, Contact { distance, normal, mean_curvature }: Contact, negated: bool) -> Self {
         let sign = if negated { -1.0 } else { 1.0 };
-        let normal = sign * DVec3::new(x, y, z);
+        let normal = sign * normal;
         let mean_curvature = sign * mean_curvature;
         Self { distance: sign * distance, normal, mean_curvature, tied: false, leaf }
     }

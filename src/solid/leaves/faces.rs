@@ -5,6 +5,7 @@ use glam::DVec3;
 use super::leaf_set::Leaves;
 use super::words::Word;
 use crate::field::{Face, Faces, Part};
+use crate::solid::contact::Contact;
 
 impl Leaves {
     /// Adds the faces of the tree that begins at `first`, unless all that it describes is farther away than
@@ -23,12 +24,10 @@ impl Leaves {
         let (parts, all) = match word {
             Word::Leaf { leaf, negated } => {
                 let sign = if negated { -1.0 } else { 1.0 };
-                let [distance, x, y, z, curvature] = self.contact(leaf, p).map(|value| sign * value);
-                faces.push(Part::Face(Face {
-                    distance,
-                    normal: DVec3::new(x, y, z),
-                    mean_curvature: curvature,
-                }));
+                let Contact { distance, normal, mean_curvature } = self.contact(leaf, p);
+                let (distance, normal, mean_curvature) =
+                    (sign * distance, sign * normal, sign * mean_curvature);
+                faces.push(Part::Face(Face { distance, normal, mean_curvature }));
                 return distance < reach;
             }
             Word::All(parts) => (parts, true),

@@ -17,7 +17,8 @@ use super::words::{self, Word};
 use crate::field::{Path, Sheet};
 use crate::geom::Aabb;
 use crate::interval::Interval;
-use crate::ir::{Contractor, Enclosure, Expr, Graph, Region, SURFACE_ROUNDING, Wanted};
+use crate::ir::{Contractor, Enclosure, Expr, Graph, Region, SURFACE_ROUNDING, Trust, Wanted};
+use crate::solid::contact::Contact;
 use crate::solid::engine::Engine;
 
 struct Leaf {
@@ -424,11 +425,17 @@ impl Leaves {
 
     /// Distance, outward normal and mean curvature, see `ir::contact`.
     #[inline]
-    pub fn contact(&self, leaf: u32, p: DVec3) -> [f64; 5] {
+    pub(super) fn estimated_contact(&self, leaf: u32, p: DVec3) -> Contact {
         let (shape, constants, uniforms) = self.of(leaf);
         let mut out = [0.0; 5];
         shape.contact(self.store.engine).point(p, constants, uniforms, &mut out);
-        out
+        let [distance, x, y, z, mean_curvature] = out;
+        Contact { distance, normal: DVec3::new(x, y, z), mean_curvature }
+    }
+
+    #[inline]
+    pub(super) fn trust(&self, leaf: u32) -> &Trust {
+        self.of(leaf).0.trust()
     }
 
     /// Velocity of the leaf's surface along its normal, see `ir::wall_velocity`.

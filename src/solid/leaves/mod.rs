@@ -1,5 +1,6 @@
 //! A solid taken apart into leaves: how they are joined, what each of them is, what is left of them in a box.
 
+mod contacts;
 mod faces;
 pub mod known_ranges;
 pub mod leaf_set;

@@ -10,7 +10,7 @@ use crate::geom::Aabb;
 use crate::interval::Interval;
 use crate::ir::{
     self, Binary, Contractor, EnclosureEvaluator, Expr, Given, Graph, Hoisted, Interpreter, Node, Outside,
-    RangeEvaluator, Region, Unary, Uniforms,
+    RangeEvaluator, Region, Trust, Unary, Uniforms,
 };
 use crate::simplify::simplify;
 use crate::solid::engine::Engine;
@@ -53,6 +53,7 @@ pub struct Shape {
     value: OnceLock<Evaluator>,
     gradient: OnceLock<Evaluator>,
     contact: OnceLock<Evaluator>,
+    trust: OnceLock<Trust>,
     /// Coefficients along a path, if the leaf is a polynomial of degree two at most.
     polynomial: OnceLock<Option<Evaluator>>,
     enclosures: OnceLock<EnclosureEvaluator>,
@@ -184,6 +185,7 @@ impl Shape {
             value,
             gradient,
             contact,
+            trust: OnceLock::new(),
             polynomial,
             enclosures,
             slopes,
@@ -235,6 +237,12 @@ impl Shape {
             let (graph, outputs, _) = simplify(&graph, &outputs);
             Evaluator::new(engine, &graph, &outputs, self.parameters)
         })
+    }
+
+    /// How far the estimates of its contacts can be trusted.
+    #[inline]
+    pub fn trust(&self) -> &Trust {
+        self.trust.get_or_init(|| Trust::of(&self.graph, self.root))
     }
 
     /// Coefficients along a path and their errors; `None` unless the leaf is a polynomial of degree two at

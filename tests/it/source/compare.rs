@@ -191,16 +191,10 @@ fn compare_in<T: Columns>(
     check("sign", &found, &sign, &omega);
 
     call(function("distance"), at, extra, [&mut found]);
-    // where the formula says nothing about the distance, the library searches for the surface, and sources do
-    // not
-    let told: Vec<usize> = (0..n).filter(|&i| found[i].wide() != 0.0 && !found[i].wide().is_nan()).collect();
-    let pick = |column: &[T]| told.iter().map(|&i| column[i]).collect::<Vec<T>>();
-    let places = at.map(pick);
-    let mut contact = [(); 5].map(|()| vec![T::default(); told.len()]);
-    solid.contact_many(places.each_ref().map(Vec::as_slice), contact.each_mut().map(Vec::as_mut_slice));
-    let mut expected = found.clone();
-    told.iter().zip(&contact[0]).for_each(|(&i, &distance)| expected[i] = distance);
-    check("distance", &found, &expected, &omega);
+    // sources have the estimates, which the library compares with signs
+    let mut estimates = [(); 5].map(|()| one());
+    solid.estimated_contact_many(at, estimates.each_mut().map(Vec::as_mut_slice));
+    check("distance", &found, &estimates[0], &omega);
     counts
 }
 
