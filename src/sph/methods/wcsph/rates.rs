@@ -431,8 +431,8 @@ impl Rates<'_> {
         if density > rest { -self.closing_rate * gap.max(0.0) } else { 0.0 }
     }
 
-    /// The rate of density, kg/m³/s, that a wall causes which moves into the gap between itself and a particle. It compresses
-    /// nothing as long as there is room. (What returns at the rate of a fall is too late: a rod that was lowered into water
+    /// The rate of density, kg/m³/s, that a wall causes which moves into the gap between itself and a surface. It compresses
+    /// nothing as long as there is room. In the depth gaps are the disorder beside walls, of which there is no end. (What returns at the rate of a fall is too late: a rod that was lowered into water
     /// with 0.1 m/s pushed a gap of a spacing ahead, and its lift was that of a rod as much longer.)
     fn into_gap(&self, i: usize, filling: &Filling) -> f64 {
         if filling.swept <= 0.0 || !closes_gaps(self.numbers) {
@@ -440,7 +440,8 @@ impl Rates<'_> {
         }
         let rest = self.parameters.rest_density;
         let gap = self.density[i] - rest * filling.whole / self.mean_filled - LOOSE * rest;
-        2.0 * rest * filling.swept * (gap / (LOOSE * rest)).clamp(0.0, 1.0)
+        let at_surface = (self.missing[i] / (2.0 * LOOSE)).min(1.0);
+        2.0 * rest * filling.swept * at_surface * (gap / (LOOSE * rest)).clamp(0.0, 1.0)
     }
 }
 
