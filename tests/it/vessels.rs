@@ -468,3 +468,34 @@ scene drop {{
     let (without, with) = (pressure("[0, 0, 0]"), pressure("[0, 0, -1e-6*(1.5 + sin(60*t))]"));
     assert!((with / without - 1.0).abs() < 0.01, "{with} {without}");
 }
+
+/// Water of `dfsph` that is full to a lid, in a chamber of a scene whose room is empty elsewhere. (It counted as a fluid with
+/// a surface, and burst within a second.)
+#[test]
+fn a_full_chamber_is_full_whatever_lies_behind_its_walls() {
+    let chamber = |walls: &str| {
+        simulation(&format!(
+            "rfm 1
+solid walls = {walls}
+scene full {{
+  box {{ min: [0, 0, 0], max: [0.4, 0.16, 0.5], restitution: 0 }}
+  obstacle {{ solid: walls, restitution: 0 }}
+  fluid water {{ shape: box([0, 0, 0], [0.16, 0.16, 0.2]), spacing: 2 cm, density: 1000 }}
+  method: dfsph
+  run {{ until: 0.2 s, save_every: 0.2 s }}
+}}"
+        ))
+    };
+    let side = "box([0.16, -1, -1], [0.24, 1, 1])";
+    let lid = "box([-1, -1, 0.2], [0.24, 1, 0.25])";
+    let mut closed = chamber(&format!("{side} or {lid}"));
+    assert!(closed.parameters().is_sealed);
+    run_to(&mut closed, 0.1);
+    assert!(closed.stats().max_speed < 1e-6, "{} m/s", closed.stats().max_speed);
+    // a hole in the lid as wide as a particle, and a lid as thin as a film, leave it open
+    let hole = "box([0.06, 0.06, -1], [0.085, 0.085, 1])";
+    let film = "box([-1, -1, 0.2], [0.24, 1, 0.202])";
+    for open in [side.to_string(), format!("{side} or {lid} \\ {hole}"), format!("{side} or {film}")] {
+        assert!(!chamber(&open).parameters().is_sealed, "{open}");
+    }
+}

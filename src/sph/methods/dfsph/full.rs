@@ -1,4 +1,4 @@
-//! What pressure demands of a fluid that fills its vessel.
+//! What pressure demands of a fluid that fills its vessel, or a chamber of it.
 //!
 //! A fluid with a surface may close the gaps between its particles before it resists. One without a surface must not: a
 //! rod that shook in a full vessel met 1 % of the resistance of the water, because displaced particles went into
@@ -6,6 +6,8 @@
 //! densities, and of all rates only their differences from the mean count: a mean is an error of the sums, which no
 //! pressure can take away, and a uniform one would grow without end. (If nothing is compressed at all, without that,
 //! a flow between two cylinders bursts. If gaps up to a quantile of the densities are left, it is rougher by a sixth.)
+
+use super::super::shifting::depth;
 
 /// Part of a deviation from the mean density that is taken back within the relaxation time, or within the time in which a
 /// particle moves by a spacing as seen from the fluid as a whole, if that is longer: what does not move has a density of
@@ -34,6 +36,35 @@ pub(super) fn find_unwanted(
     remove_means(free, of, *count);
 }
 
+/// Which bodies of fluid have no surface: chambers that are full for the time being, beside others that are not.
+pub(super) fn closed((of, count): &(Vec<usize>, usize), spread: &[f64]) -> Vec<bool> {
+    let mut is_closed = vec![true; *count];
+    spread
+        .iter()
+        .zip(of)
+        .filter(|(spread, _)| depth(**spread) == 0.0)
+        .for_each(|(_, body)| is_closed[*body] = false);
+    is_closed
+}
+
+/// Takes from the rates that pressure has to take away, kg/m³/s, and from the pressures of each closed body, what no
+/// pressure can change and what none needs. (Gaps count as nothing in a fluid with a surface, and rates so as more than
+/// nothing in the mean. In a chamber at rest that was full to its lid, pressures grew tenfold in a tenth of a second.)
+pub(super) fn keep_volumes(
+    free: &mut [f64],
+    pressures: &mut [f64],
+    (of, count): &(Vec<usize>, usize),
+    closed: &[bool],
+) {
+    let mean = means(free, of, *count);
+    let mut least = vec![f64::INFINITY; *count];
+    pressures.iter().zip(of).for_each(|(p, body)| least[*body] = least[*body].min(*p));
+    for ((rate, p), body) in free.iter_mut().zip(pressures).zip(of).filter(|(_, body)| closed[**body]) {
+        *rate -= mean[*body];
+        *p -= least[*body];
+    }
+}
+
 /// Takes from the pressures of each body the least of them: only differences act, and what pressure once needed would
 /// stay as a level that nothing takes back. (A tank that began to be pushed kept 600 Pa.)
 pub(super) fn lower(pressures: &mut [f64], (of, count): &(Vec<usize>, usize)) {
@@ -60,7 +91,7 @@ fn means(numbers: &[f64], of: &[usize], count: usize) -> Vec<f64> {
 
 #[cfg(test)]
 mod tests {
-    use super::{find_unwanted, lower};
+    use super::{closed, find_unwanted, keep_volumes, lower};
 
     #[test]
     fn only_differences_within_a_body_count() {
@@ -92,5 +123,15 @@ mod tests {
         let mut pressures = vec![3.0, 9.0, 5.0, 7.0];
         lower(&mut pressures, &(vec![0, 1, 0, 1], 2));
         assert_eq!(pressures, [0.0, 2.0, 2.0, 0.0]);
+    }
+
+    #[test]
+    fn only_bodies_without_a_surface_keep_their_volume() {
+        let two = (vec![0, 1, 0, 1], 2);
+        let closed = closed(&two, &[0.98, 0.7, 0.9, 0.98]);
+        assert_eq!(closed, [true, false]);
+        let (mut free, mut pressures) = ([1.0, 5.0, 3.0, 7.0], [4.0, 2.0, 6.0, 3.0]);
+        keep_volumes(&mut free, &mut pressures, &two, &closed);
+        assert_eq!((free, pressures), ([-1.0, 5.0, 1.0, 7.0], [0.0, 2.0, 2.0, 3.0]));
     }
 }

@@ -173,6 +173,8 @@ pub struct DivergenceFree {
     pub(super) iterations: u32,
     /// Length of the last step, s; zero at the start.
     last_dt: f64,
+    /// Whether any body of a fluid with a surface has none itself.
+    any_closed: bool,
 }
 
 /// Greatest factor of a force that depends on the place. A step may be a short remainder before a frame; the
@@ -181,6 +183,12 @@ const MOST_CARRIED: f64 = 2.0;
 
 /// Name of the length of the last step in a checkpoint.
 const LAST_STEP: &str = "last step";
+
+/// Name of whether there are closed bodies in a checkpoint.
+const CLOSED: &str = "closed bodies";
+
+/// Steps from one look for closed bodies to the next.
+const LOOK: u64 = 16;
 
 impl Scheme for DivergenceFree {
     fn step(&mut self, core: &mut Core, most: f64) -> Result<f64, StepError> {
@@ -225,6 +233,7 @@ impl Scheme for DivergenceFree {
         self.carried.save(checkpoint);
         checkpoint.set("stiffness", vec![self.forces.stiffness, self.places.stiffness]);
         checkpoint.set(LAST_STEP, vec![self.last_dt]);
+        checkpoint.set(CLOSED, vec![f64::from(u8::from(self.any_closed))]);
         save_crowding(&self.crowding, checkpoint);
         self.roughness.save(checkpoint);
     }
@@ -242,6 +251,7 @@ impl Scheme for DivergenceFree {
             [last_dt] if last_dt.is_finite() && *last_dt >= 0.0 => *last_dt,
             _ => return Err(CheckpointError::Column(LAST_STEP.into())),
         };
+        self.any_closed = matches!(checkpoint.get(CLOSED)?, [closed] if *closed != 0.0);
         self.crowding = restore_crowding(checkpoint)?;
         self.roughness.restore(checkpoint)
     }
@@ -312,6 +322,7 @@ impl DivergenceFree {
             surface: FreeSurface::default(),
             iterations: 0,
             last_dt: 0.0,
+            any_closed: false,
         };
         scheme.find_lattice(&core.parameters);
         scheme.settle(core, &mut []);
@@ -437,6 +448,7 @@ impl DivergenceFree {
             };
             self.free.clear();
             self.free.extend(rates.iter().zip(densities).zip(debts).map(unwanted));
+            self.keep_closed_volumes(core);
         }
         // The error that a step leaves becomes a debt, which the next steps pay back. Even if every step
         // leaves one, the debt is at most eight tolerances. Only positions guarantee the density.
@@ -466,6 +478,19 @@ impl DivergenceFree {
         add_scaled(&mut core.acceleration, &self.ahead.push, 0.5);
         self.report_pressure(core, dt, relaxation, hydrostatic.as_ref());
         self.carried.act(core, 0.5 * dt);
+    }
+
+    /// Lets bodies of fluid without a surface keep their volume. Whether there are any is looked for now and then.
+    fn keep_closed_volumes(&mut self, core: &Core) {
+        if !(self.any_closed || core.steps.is_multiple_of(LOOK)) {
+            return;
+        }
+        let bodies = bodies(core, core.parameters.spacing());
+        let closed = full::closed(&bodies, &self.spread);
+        self.any_closed = closed.contains(&true);
+        if self.any_closed {
+            full::keep_volumes(&mut self.free, &mut self.forces.s, &bodies, &closed);
+        }
     }
 
     /// Finds the displacements of a step of the length dt: those by shifting, and those that keep densities
