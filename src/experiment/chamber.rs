@@ -25,9 +25,9 @@ fn neighbours([x, y, z]: Cell) -> [Cell; 6] {
 }
 
 impl Experiment {
-    /// Whether a fluid within the given box fills its chamber at the start. Walls thinner than a cell may count as
-    /// none, so that the answer is no.
-    pub(super) fn fills_its_chamber(&self, within: &Aabb) -> bool {
+    /// Whether a fluid of a volume, m³, within the given box fills its chamber at the start, or all of its chambers. Walls
+    /// thinner than a cell may count as none, so that the answer is no.
+    pub(super) fn fills_its_chamber(&self, within: &Aabb, volume: f64) -> bool {
         let cell = CELL * self.parameters.spacing();
         let (from, domain) = (within.min, self.scene.domain);
         let counts = (within.size() / cell).ceil().max(DVec3::ONE);
@@ -41,10 +41,7 @@ impl Experiment {
             domain.contains(place) && crowd.is_free(place)
         };
         let is_wet = |at: Cell| self.fluid.omega(centre(at)) > 0.0;
-        let [nx, ny, nz] = counts.to_array().map(|count| count as i32);
-        let cells = (0..nz).flat_map(|z| (0..ny).flat_map(move |y| (0..nx).map(move |x| [x, y, z])));
-        let wet: Vec<Cell> = cells.filter(|at| is_wet(*at) && is_free(*at)).collect();
-        let room = (LEAST_ROOM - 1.0) * wet.len() as f64;
+        let room = (LEAST_ROOM - 1.0) * volume / cell.powi(3);
         let (mut seen, mut dry) = (HashSet::new(), Vec::new());
         let mut explore = |at: Cell, dry: &mut Vec<Cell>| {
             for next in neighbours(at) {
@@ -53,17 +50,23 @@ impl Experiment {
                 }
             }
         };
+        let [nx, ny, nz] = counts.to_array().map(|count| count as i32);
+        // most surfaces lie at the top, and what has one is soon found to have it
+        let cells = (0..nz).rev().flat_map(|z| (0..ny).flat_map(move |y| (0..nx).map(move |x| [x, y, z])));
         let mut found = 0;
-        for at in &wet {
-            explore(*at, &mut dry);
+        for at in cells.filter(|at| is_wet(*at)) {
+            if !is_free(at) {
+                continue;
+            }
+            explore(at, &mut dry);
             while let Some(next) = dry.pop() {
                 found += 1;
-                if found as f64 > room {
+                if f64::from(found) > room {
                     return false;
                 }
                 explore(next, &mut dry);
             }
         }
-        !wet.is_empty()
+        true
     }
 }

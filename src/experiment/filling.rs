@@ -127,7 +127,8 @@ impl Experiment {
         }
         // other methods do not ask, and many bodies take time
         let fills_vessel = self.parameters.keeps_density()
-            && (self.has_no_more_room(&within, LEAST_ROOM * volume) || self.fills_its_chamber(&within));
+            && (self.has_no_more_room(&within, LEAST_ROOM * volume)
+                || self.fills_its_chamber(&within, volume));
         let alone = Region { shape: &*shape, bodies: Vec::new(), within }.volume();
         let taken = (alone - volume).max(0.0);
         let (mut particles, mut carved, cell) = self.fit(obstacles, within, volume, taken)?;

@@ -55,8 +55,8 @@ pub(super) fn falling_rate(core: &Core) -> f64 {
     RETURN * (gravity / core.parameters.support_radius).sqrt()
 }
 
-/// How far a particle belongs to the fluid's depth, 0 to 1, from its G: one in the depth, a half at a flat
-/// surface.
+/// How far a particle belongs to the fluid's depth, 0 to 1, from its G: one in the depth, zero at a flat
+/// surface, where G is 0.72.
 pub(super) fn depth(spread: f64) -> f64 {
     let [surface, depth] = SURFACE;
     ((spread - surface) / (depth - surface)).clamp(0.0, 1.0)

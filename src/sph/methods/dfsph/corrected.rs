@@ -35,8 +35,8 @@ use crate::sph::{
     particles::Vectors,
 };
 
-/// A particle whose det B is below this part of (⅓ tr B)³ has neighbours near a plane, and keeps A = 1. Eigenvalues of A are
-/// at most 11 then.
+/// A particle whose det B is below this part of (⅓ tr B)³ has neighbours near a plane, and keeps A = 1. So the eigenvalues of
+/// A are at most 11.
 const FLAT: f64 = 0.2;
 
 /// Where less than this of the trace of 1 − K is left, walls are all around a particle, and it keeps A = 1.

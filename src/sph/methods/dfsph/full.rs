@@ -47,30 +47,36 @@ pub(super) fn closed((of, count): &(Vec<usize>, usize), spread: &[f64]) -> Vec<b
     is_closed
 }
 
-/// Takes from the rates that pressure has to take away, kg/m³/s, and from the pressures of each closed body, what no
-/// pressure can change and what none needs. (Gaps count as nothing in a fluid with a surface, and rates so as more than
-/// nothing in the mean. In a chamber at rest that was full to its lid, pressures grew tenfold in a tenth of a second.)
+/// Does for closed bodies what [`find_unwanted`] and [`lower`] do for a full vessel: takes from the rates that pressure has
+/// to take away, kg/m³/s, their mean, and from the pressures p/ρ² the least. (In a fluid with a surface gaps want nothing,
+/// so the mean of what is wanted is above zero, and where there is no surface no pressure can give it: in a chamber at rest
+/// that was full to its lid pressures grew tenfold in a tenth of a second.)
 pub(super) fn keep_volumes(
     free: &mut [f64],
     pressures: &mut [f64],
-    (of, count): &(Vec<usize>, usize),
+    bodies: &(Vec<usize>, usize),
     closed: &[bool],
 ) {
-    let mean = means(free, of, *count);
-    let mut least = vec![f64::INFINITY; *count];
-    pressures.iter().zip(of).for_each(|(p, body)| least[*body] = least[*body].min(*p));
+    let (of, count) = bodies;
+    let (mean, least) = (means(free, of, *count), least(pressures, bodies));
     for ((rate, p), body) in free.iter_mut().zip(pressures).zip(of).filter(|(_, body)| closed[**body]) {
         *rate -= mean[*body];
         *p -= least[*body];
     }
 }
 
-/// Takes from the pressures of each body the least of them: only differences act, and what pressure once needed would
+/// Takes from the pressures p/ρ² of each body the least of them: only differences act, and what pressure once needed would
 /// stay as a level that nothing takes back. (A tank that began to be pushed kept 600 Pa.)
-pub(super) fn lower(pressures: &mut [f64], (of, count): &(Vec<usize>, usize)) {
+pub(super) fn lower(pressures: &mut [f64], bodies: &(Vec<usize>, usize)) {
+    let least = least(pressures, bodies);
+    pressures.iter_mut().zip(&bodies.0).for_each(|(p, body)| *p -= least[*body]);
+}
+
+/// The least of the numbers of each body.
+fn least(numbers: &[f64], (of, count): &(Vec<usize>, usize)) -> Vec<f64> {
     let mut least = vec![f64::INFINITY; *count];
-    pressures.iter().zip(of).for_each(|(p, body)| least[*body] = least[*body].min(*p));
-    pressures.iter_mut().zip(of).for_each(|(p, body)| *p -= least[*body]);
+    numbers.iter().zip(of).for_each(|(number, body)| least[*body] = least[*body].min(*number));
+    least
 }
 
 /// Takes from the numbers of each body their mean.

@@ -31,9 +31,9 @@ const LEAST_FOUND: f64 = 0.1;
 /// Steps from one look at the room that moving walls leave to the next.
 const LOOK: u64 = 16;
 
-/// A vessel is open if its room is this many times the volume of the fluid: 1.03 at the start still count as full, and
-/// samples are off by a hundredth.
-const OPEN: f64 = 1.05;
+/// A vessel is open if the room around the fluid has grown by this part of the fluid's volume: three hundredths at the start
+/// still count as full, and samples are off by a hundredth.
+const OPEN: f64 = 0.05;
 
 /// How far room is looked for around the particles, in spacings.
 const AROUND: f64 = 2.0;
@@ -42,12 +42,19 @@ const AROUND: f64 = 2.0;
 const SAMPLES: f64 = 16_384.0;
 const MOST_SAMPLES: f64 = 262_144.0;
 
-/// Whether walls that move leave the fluid of a sealed vessel more room than it fills. It is looked for now and then.
-pub(super) fn has_opened(core: &Core) -> bool {
-    let Core { parameters, boundary, particles, .. } = core;
-    if !(parameters.is_sealed && boundary.any_moves() && core.steps.is_multiple_of(LOOK)) {
-        return false;
+/// Whether walls that move leave the fluid of a sealed vessel more room than it fills. It is looked for now and then, and
+/// compared with the first look, `at_start`: behind thin walls there may be room that is not the fluid's.
+pub(super) fn has_opened(core: &Core, at_start: &mut Option<f64>) -> bool {
+    let is_asked = core.parameters.is_sealed && core.boundary.any_moves() && core.steps.is_multiple_of(LOOK);
+    is_asked && {
+        let room = room(core);
+        room > at_start.get_or_insert(room).max(1.0) + OPEN
     }
+}
+
+/// The room around the fluid over its volume.
+fn room(core: &Core) -> f64 {
+    let Core { parameters, boundary, particles, .. } = core;
     let fluid = particles.len() as f64 * parameters.particle_mass / parameters.rest_density;
     let hold = |all: Aabb, at: DVec3| Aabb::new(all.min.min(at), all.max.max(at));
     let nearby = particles.position.iter().fold(Aabb::EMPTY, hold).grown(AROUND * parameters.spacing());
@@ -58,7 +65,7 @@ pub(super) fn has_opened(core: &Core) -> bool {
         boundary.fields().all(|field| field.omega(at) < 0.0)
     };
     let free = (1..=samples).into_par_iter().filter(is_free).count();
-    nearby.volume() * free as f64 / f64::from(samples) > OPEN * fluid
+    nearby.volume() * free as f64 / f64::from(samples) / fluid
 }
 
 /// The hydrostatic pressure at the present places.

@@ -185,6 +185,8 @@ impl Declaration for Dfsph {
         "step ahead",
         "stiffness",
         "last step",
+        "closed bodies",
+        "room at the start",
         "crowding x",
         "crowding y",
         "crowding z",

@@ -175,6 +175,8 @@ pub struct DivergenceFree {
     last_dt: f64,
     /// Whether any body of a fluid with a surface has none itself.
     any_closed: bool,
+    /// The room around the fluid of a sealed vessel in which something moves, over its volume, at the first look.
+    room_at_start: Option<f64>,
 }
 
 /// Greatest factor of a force that depends on the place. A step may be a short remainder before a frame; the
@@ -186,6 +188,9 @@ const LAST_STEP: &str = "last step";
 
 /// Name of whether there are closed bodies in a checkpoint.
 const CLOSED: &str = "closed bodies";
+
+/// Name of the room at the first look in a checkpoint.
+const ROOM: &str = "room at the start";
 
 /// Steps from one look for closed bodies to the next.
 const LOOK: u64 = 16;
@@ -217,9 +222,10 @@ impl Scheme for DivergenceFree {
         self.settle(core, &mut []);
         self.last_dt = dt;
         core.check_finite(dt)?;
-        if hydrostatic::has_opened(core) {
+        if hydrostatic::has_opened(core, &mut self.room_at_start) {
             (core.parameters.is_sealed, core.parameters.fills_vessel) = (false, false);
             self.carried.end();
+            self.any_closed = true;
         }
         Ok(dt)
     }
@@ -234,6 +240,7 @@ impl Scheme for DivergenceFree {
         checkpoint.set("stiffness", vec![self.forces.stiffness, self.places.stiffness]);
         checkpoint.set(LAST_STEP, vec![self.last_dt]);
         checkpoint.set(CLOSED, vec![f64::from(u8::from(self.any_closed))]);
+        checkpoint.set(ROOM, self.room_at_start.into_iter().collect());
         save_crowding(&self.crowding, checkpoint);
         self.roughness.save(checkpoint);
     }
@@ -251,6 +258,7 @@ impl Scheme for DivergenceFree {
             [last_dt] if last_dt.is_finite() && *last_dt >= 0.0 => *last_dt,
             _ => return Err(CheckpointError::Column(LAST_STEP.into())),
         };
+        self.room_at_start = checkpoint.get(ROOM)?.first().copied();
         self.any_closed = matches!(checkpoint.get(CLOSED)?, [closed] if *closed != 0.0);
         self.crowding = restore_crowding(checkpoint)?;
         self.roughness.restore(checkpoint)
@@ -323,6 +331,7 @@ impl DivergenceFree {
             iterations: 0,
             last_dt: 0.0,
             any_closed: false,
+            room_at_start: None,
         };
         scheme.find_lattice(&core.parameters);
         scheme.settle(core, &mut []);

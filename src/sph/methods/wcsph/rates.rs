@@ -432,15 +432,16 @@ impl Rates<'_> {
     }
 
     /// The rate of density, kg/m³/s, that a wall causes which moves into the gap between itself and a surface. It compresses
-    /// nothing as long as there is room. In the depth gaps are the disorder beside walls, of which there is no end. (What returns at the rate of a fall is too late: a rod that was lowered into water
-    /// with 0.1 m/s pushed a gap of a spacing ahead, and its lift was that of a rod as much longer.)
+    /// nothing as long as there is room. Away from surfaces gaps are disorder beside walls, which no motion of a wall
+    /// closes. (What returns at the rate of a fall is too late: a rod that was lowered into water with 0.1 m/s pushed a gap
+    /// of a spacing ahead, and its lift was that of a rod as much longer.)
     fn into_gap(&self, i: usize, filling: &Filling) -> f64 {
         if filling.swept <= 0.0 || !closes_gaps(self.numbers) {
             return 0.0;
         }
         let rest = self.parameters.rest_density;
         let gap = self.density[i] - rest * filling.whole / self.mean_filled - LOOSE * rest;
-        let at_surface = (self.missing[i] / (2.0 * LOOSE)).min(1.0);
+        let at_surface = (self.missing[i] / LOOSE).min(1.0);
         2.0 * rest * filling.swept * at_surface * (gap / (LOOSE * rest)).clamp(0.0, 1.0)
     }
 }

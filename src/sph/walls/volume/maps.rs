@@ -104,7 +104,7 @@ impl Rigid {
 
 /// What the maps know of an obstacle at a place.
 pub(in crate::sph) enum Known {
-    /// It is one of those at rest, see [`Maps::at_rest`].
+    /// It is one of those at rest, see [`Maps::in_box`].
     AtRest,
     /// It moves as a whole.
     Taken(Taken),
