@@ -304,6 +304,7 @@ proptest! {
 
 /// A file may unroll to more operations if it is longer, and the message says what there is to shorten.
 #[test]
+#[ignore = "long"]
 fn the_limit_of_operations_grows_with_the_file() {
     let lines = |count: usize| {
         let line = |i| {

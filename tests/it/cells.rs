@@ -178,6 +178,7 @@ fn leaves_of_one_shape_share_a_program_and_far_cells_need_none() {
 
 /// Every distance of [`Solid::contact`] below the reach is found, from the same surface, and no other.
 #[test]
+#[ignore = "long"]
 fn contacts_are_those_of_the_solid() {
     let example = |name: &str| {
         let path = format!("{}/examples/{name}.rfm", env!("CARGO_MANIFEST_DIR"));

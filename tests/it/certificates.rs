@@ -176,6 +176,7 @@ fn spheres() -> Solid {
 
 /// A bound is useful if it lies close to what happens: within two orders of magnitude on ordinary scenes.
 #[test]
+#[ignore = "long"]
 fn certificates_of_ordinary_solids_are_useful() {
     let box3 = Aabb::new(DVec3::ZERO, DVec3::splat(3.0));
     let wide = Aabb::new(DVec3::splat(-1.0), DVec3::splat(4.0));

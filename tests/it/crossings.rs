@@ -240,6 +240,7 @@ fn random_solids(count: u32, is_cut: bool) {
 }
 
 #[test]
+#[ignore = "long"]
 fn random_solids_do_not_cross_themselves() {
     random_solids(40, false);
 }

@@ -170,6 +170,7 @@ fn clearances_are_finite() {
 
 /// Solids whose distance is known in closed form, at random points and at points of their axes.
 #[test]
+#[ignore = "long"]
 fn clearances_are_never_too_long() {
     let segment = |p: DVec3| (p.with_z(p.z - p.z.clamp(0.0, 1.5))).length() - 0.4;
     let ring = |p: DVec3| (p.truncate().length() - 0.9).hypot(p.z) - 0.2;

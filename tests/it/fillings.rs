@@ -152,6 +152,7 @@ scene pool {{
 /// would end beside one of the surfaces, and the shallow water would be too much by 7 %, the deep one too
 /// little by 3 %.
 #[test]
+#[ignore = "long"]
 fn every_level_of_a_fluid_is_filled() {
     let wall = "solid wall = box([0.95, -1, -1], [1.05, 2, 2])";
     for (wall, obstacle, middle) in [("", "", [1.0, 1.0]), (wall, "obstacle { solid: wall }", [0.95, 1.05])] {
@@ -354,6 +355,7 @@ scene full {
 /// where the floor is 45 degrees away, where the shape is only the room for a number of particles of a stated
 /// size, or where a lattice does not fit a plate.
 #[test]
+#[ignore = "long"]
 fn walls_without_particles_are_told_of() {
     let said = |solid: &str, fluid: &str| {
         let text = format!(

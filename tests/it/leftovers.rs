@@ -101,6 +101,7 @@ fn devices_pipes_and_links_stay_what_they_are() {
 /// Ctrl-C in the middle of a film: the command ends at once, and so does the program that encodes for it.
 #[cfg(unix)]
 #[test]
+#[ignore = "long"]
 fn an_interrupted_film_leaves_nothing() {
     use std::os::unix::fs::PermissionsExt;
     use std::process::{Command, Stdio};

@@ -192,6 +192,7 @@ fn what_cannot_be_swept_is_refused_before_anything_is_done() {
 }
 
 #[test]
+#[ignore = "long"]
 fn a_sweep_is_continued_replaced_or_left_alone() {
     let folder = in_folder(BALL);
     let mesh = |sweep: &str, more: &[&str]| {
@@ -339,6 +340,7 @@ fn a_run_and_a_sweep_have_folders_of_their_own() {
 /// The row that was interrupted goes on from its own checkpoint, and ends as one that was not.
 #[cfg(unix)]
 #[test]
+#[ignore = "long"]
 fn an_interrupted_sweep_goes_on_within_its_row() {
     let folder = in_folder(&FALL.replace("save_every: 0.05 s", "save_every: 4 ms"));
     let arguments =
@@ -384,6 +386,7 @@ fn an_interrupted_sweep_goes_on_within_its_row() {
 
 /// A volume that no cells show is measured along lines, in the table of a sweep too.
 #[test]
+#[ignore = "long"]
 fn volumes_that_are_not_resolved_by_cells_have_their_error_in_the_table() {
     let folder = in_folder(
         "rfm 1\nparam r = 0.2 in 0.05 .. 0.9\nsolid pin = box([0, 0, 0], [1, 1, 0.5]) \\ cylinder(r, 2).move([0.5, 0.5, -0.5])\n",

@@ -73,6 +73,7 @@ fn pictures_of_solids_say_what_they_do_not_show() {
 }
 
 #[test]
+#[ignore = "long"]
 fn every_frame_becomes_a_picture_with_the_same_bytes_on_any_number_of_threads() {
     let folder = tempfile::tempdir().unwrap();
     let here = folder.path();

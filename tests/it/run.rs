@@ -73,6 +73,7 @@ fn run(folder: &Path, flags: &[&str]) -> Outcome {
 }
 
 #[test]
+#[ignore = "long"]
 fn a_run_that_was_stopped_goes_on_as_if_it_had_not_been() {
     for method in METHODS {
         let folder = tempfile::tempdir().unwrap();
@@ -278,6 +279,7 @@ fn what_a_resumed_run_lacks_is_told() {
 
 #[cfg(unix)]
 #[test]
+#[ignore = "long"]
 fn an_interrupted_run_has_a_checkpoint_and_goes_on() {
     for signal in ["-INT", "-TERM"] {
         let folder = tempfile::tempdir().unwrap();

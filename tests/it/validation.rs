@@ -78,6 +78,7 @@ fn velocity_within(name: &str, params: &[(&str, f64)], bar: f64) {
 }
 
 #[test]
+#[ignore = "long"]
 fn every_flow_checks_without_a_word() {
     let mut names: Vec<_> = std::fs::read_dir(root().join("examples/validation"))
         .unwrap()
@@ -181,6 +182,7 @@ fn a_block_falls_as_one() {
 }
 
 #[test]
+#[ignore = "long"]
 fn vortices_keep_their_shape_and_decay() {
     // 24 spacings along a side; 40 deviate by half of that
     velocity_within("taylor_green", &[("particles", 3456.0)], 0.06);

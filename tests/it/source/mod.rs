@@ -408,6 +408,7 @@ fn an_object_file_is_linked_into_a_c_host_and_has_the_bits_of_rfm() {
 }
 
 #[test]
+#[ignore = "long"]
 fn rust_is_compiled_by_rustc_alone_and_has_the_bits_of_rfm() {
     if !is_here("rustc") {
         return;
