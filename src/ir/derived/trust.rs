@@ -19,6 +19,10 @@ const MOST_LEAVES: usize = 256;
 /// Creases beyond this number are not looked at: each takes a part of the time of a contact.
 const MOST_CREASES: usize = 16;
 
+/// Roots of sums of more squares are not taken for lengths. A sum may repeat its parts, and a chain of such sums has endlessly
+/// many squares.
+const MOST_SQUARES: usize = 16;
+
 /// A point is on a crease if it is nearer than this part of its coordinates and of the lengths in the formula.
 const ON_CREASE: f64 = 1e-6;
 
@@ -343,10 +347,14 @@ impl Term {
     }
 }
 
-/// The nodes whose squares a node is the sum of; `None` for other nodes.
+/// The nodes whose squares a node is the sum of; `None` for other nodes, and if there are more than [`MOST_SQUARES`].
 fn squares(graph: &Graph, node: Node) -> Option<Vec<Node>> {
     let (mut waiting, mut found) = (vec![node], Vec::new());
     while let Some(node) = waiting.pop() {
+        // each that waits is a square at least
+        if found.len() + waiting.len() >= MOST_SQUARES {
+            return None;
+        }
         match graph.expr(node) {
             Expr::Binary(Binary::Add, a, b) => waiting.extend([a, b]),
             Expr::Binary(Binary::Mul, a, b) if a == b => found.push(a),
