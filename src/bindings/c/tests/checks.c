@@ -271,6 +271,15 @@ static void programs_tell_of_their_params(void) {
     CHECK(rfm_program_with(program, NULL, 1, &then, NULL) == RFM_BAD_ARGUMENT);
     CHECK(rfm_program_with(NULL, NULL, 0, &then, NULL) == RFM_BAD_ARGUMENT);
     rfm_program_free(program);
+    /* a range from 5 to 2 has no members: only both values together are allowed */
+    const char *range = "rfm 1\nparam m = 1\nparam n = 2\nsolid s = any i in m..n: sphere(i)";
+    CHECK(rfm_load_text(range, "b.rfm", NULL, 0, &program, NULL) == RFM_OK);
+    CHECK(rfm_program_with(program, (const char *[]){"m=5"}, 1, &then, NULL) == RFM_MISTAKES);
+    CHECK(rfm_program_with(program, (const char *[]){"m=5", "n=6"}, 2, &then, NULL) == RFM_OK);
+    CHECK(rfm_solid(then, "s", &solid, NULL) == RFM_OK && rfm_sign(solid, 4.9, 0, 0) == 1.0);
+    rfm_solid_free(solid);
+    rfm_program_free(then);
+    rfm_program_free(program);
 }
 
 /* what is asked of one point has the same answer among many */
