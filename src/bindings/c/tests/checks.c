@@ -343,13 +343,16 @@ static void solids_and_fluids_have_meshes(void) {
     CHECK(fabs(volume - 6) < 1e-6 && uncertainty >= 0 && uncertainty < 1e-3);
     CHECK(rfm_volume(floor, 96, &volume, NULL, &error) == RFM_BAD_ARGUMENT);
     CHECK(strstr(rfm_error_message(error), "`floor` could not be proven to end") != NULL);
+    CHECK(strstr(rfm_error_message(error), "state the box") == NULL);
     rfm_error_free(error);
     CHECK(rfm_volume(brick, 96, NULL, NULL, NULL) == RFM_BAD_ARGUMENT);
     CHECK(rfm_mesh(brick, 32, NULL, NULL, &mesh, NULL) == RFM_OK);
     CHECK(rfm_mesh_vertex_count(mesh) > 100 && rfm_mesh_triangle_count(mesh) > 200 && fabs(enclosed(mesh) - 36) < 1e-6);
     CHECK(fabs(fabs(rfm_mesh_normals(mesh)[0]) + fabs(rfm_mesh_normals(mesh)[1]) + fabs(rfm_mesh_normals(mesh)[2])) > 0.99);
     rfm_mesh_free(mesh);
-    CHECK(rfm_mesh(floor, 16, NULL, NULL, &mesh, NULL) == RFM_BAD_ARGUMENT && mesh == NULL);
+    CHECK(rfm_mesh(floor, 16, NULL, NULL, &mesh, &error) == RFM_BAD_ARGUMENT && mesh == NULL);
+    CHECK(strstr(rfm_error_message(error), "could not be proven to end anywhere: state the box to mesh") != NULL);
+    rfm_error_free(error);
     CHECK(rfm_mesh(floor, 16, low, high, &mesh, NULL) == RFM_OK && fabs(enclosed(mesh) - 6) < 1e-6);
     rfm_mesh_free(mesh);
     CHECK(rfm_mesh(floor, 16, low, NULL, &mesh, NULL) == RFM_BAD_ARGUMENT);
