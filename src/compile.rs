@@ -207,29 +207,31 @@ impl Program {
     /// # Errors
     /// [`Error::Diagnostics`] if the file declares no such param, or if the value makes it wrong.
     pub fn with(&self, param: &str, value: f64) -> Result<Self, Error> {
-        // a program gives numbers in SI units, whatever the file writes
-        let declared = self.module.params.iter().find(|declared| declared.name == param);
-        let dimension = declared.and_then(|declared| declared.unit.as_ref()).map(|(unit, _)| unit.dimension);
-        self.with_quantity(param, value, dimension)
+        self.with_quantities([(param, value, None)])
     }
 
-    /// [`with`](Self::with), where the value in SI units was given with a unit of this dimension, which is to
-    /// fit that of the file, or without one.
+    /// [`with`](Self::with) for several params at once: the file is checked with all of them, and may be wrong with some of
+    /// them only, as one with a range `m..n` is on the way from 1..2 to 5..6. A value in SI units may have been given with
+    /// a unit of some dimension.
     ///
     /// # Errors
-    /// [`Error::Diagnostics`] also if it does not.
-    pub fn with_quantity(
+    /// [`Error::Diagnostics`] if the file lacks one of the params, if a dimension is not that of the file, or if the values
+    /// make the file wrong.
+    pub fn with_quantities<'a>(
         &self,
-        param: &str,
-        value: f64,
-        dimension: Option<Dimension>,
+        quantities: impl IntoIterator<Item = (&'a str, f64, Option<Dimension>)>,
     ) -> Result<Self, Error> {
         let mut options = self.options.clone();
-        options.overrides.insert(param.to_string(), value);
-        match dimension {
-            Some(dimension) => options.dimensions.insert(param.to_string(), dimension),
-            None => options.dimensions.remove(param),
-        };
+        for (param, value, dimension) in quantities {
+            // a program gives numbers in SI units, whatever the file writes
+            let declared = self.module.params.iter().find(|declared| declared.name == param);
+            let unit = declared.and_then(|declared| declared.unit.as_ref());
+            options.overrides.insert(param.to_string(), value);
+            match dimension.or(unit.map(|(unit, _)| unit.dimension)) {
+                Some(dimension) => options.dimensions.insert(param.to_string(), dimension),
+                None => options.dimensions.remove(param),
+            };
+        }
         self.lowered_again(options)
     }
 

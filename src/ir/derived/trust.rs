@@ -19,6 +19,10 @@ const MOST_LEAVES: usize = 256;
 /// Creases beyond this number are not looked at: each takes a part of the time of a contact.
 const MOST_CREASES: usize = 16;
 
+/// Roots of sums of more squares are not taken for lengths. A sum may repeat its parts, and a chain of such sums has endlessly
+/// many squares.
+const MOST_SQUARES: usize = 16;
+
 /// A point is on a crease if it is nearer than this part of its coordinates and of the lengths in the formula.
 const ON_CREASE: f64 = 1e-6;
 
@@ -41,7 +45,8 @@ const SOME_TIME: f64 = 0.37;
 pub enum Kind {
     /// Planes, balls and cylinders, and what lengths make of them: the estimate is the distance of the leaf.
     Exact,
-    /// Other quadrics: the estimate is exact along a normal, which may not be that of the nearest place.
+    /// Other quadrics, and lengths in stretched coordinates: the estimate is exact along a normal, or nearly so, which may not
+    /// be that of the nearest place.
     Bent,
     /// All other formulas.
     Doubtful,
@@ -191,11 +196,13 @@ impl Crease {
 fn kind_of_leaf(graph: &Graph, leaf: Node, creases: &mut Vec<Crease>) -> Kind {
     let mut terms: FxHashMap<Node, Term> = FxHashMap::default();
     for node in graph.cone(leaf) {
-        let term = Term::of(graph, node, &terms, creases).unwrap_or(Term::OTHER);
+        let mut term = Term::of(graph, node, &terms, creases).unwrap_or(Term::OTHER);
+        term.is_stretched |= graph.expr(node).operands().any(|operand| terms[&operand].is_stretched);
         terms.insert(node, term);
     }
-    let Term { degree, is_polynomial, .. } = terms[&leaf];
+    let Term { degree, is_polynomial, is_stretched, .. } = terms[&leaf];
     match degree {
+        0..=2 if is_stretched => Kind::Bent,
         0 | 1 => Kind::Exact,
         2 if is_polynomial && !bends_evenly(graph, leaf) => Kind::Bent,
         2 => Kind::Exact,
@@ -225,16 +232,18 @@ struct Term {
     degree: u32,
     /// Whether it is a polynomial in the coordinates.
     is_polynomial: bool,
+    /// Whether a length in it grows faster in one direction than in another.
+    is_stretched: bool,
     linear: Option<Linear>,
 }
 
 impl Term {
-    const NUMBER: Self = Self { degree: 0, is_polynomial: true, linear: None };
+    const NUMBER: Self = Self { degree: 0, is_polynomial: true, is_stretched: false, linear: None };
 
     /// Of a higher degree, or of none.
-    const OTHER: Self = Self { degree: 3, is_polynomial: false, linear: None };
+    const OTHER: Self = Self { degree: 3, is_polynomial: false, is_stretched: false, linear: None };
 
-    const LENGTH: Self = Self { degree: 1, is_polynomial: false, linear: None };
+    const LENGTH: Self = Self { degree: 1, is_polynomial: false, is_stretched: false, linear: None };
 
     /// `None` for nodes of a higher degree, or of none.
     fn of(
@@ -266,7 +275,7 @@ impl Term {
             Axis::Z => DVec3::Z,
             Axis::T => return Self::NUMBER,
         };
-        Self { degree: 1, is_polynomial: true, linear: Some(Linear::new(normal, 0.0)) }
+        Self { degree: 1, linear: Some(Linear::new(normal, 0.0)), ..Self::NUMBER }
     }
 
     fn unary(
@@ -292,8 +301,16 @@ impl Term {
                     return None;
                 }
                 let forms: Option<Vec<Linear>> = squares.iter().map(|square| known[square].linear).collect();
+                let is_stretched = match &forms {
+                    Some(forms) => !are_axes(forms),
+                    // numbers that are not known yet
+                    None if squares.iter().all(|square| known[square].is_polynomial) => {
+                        squares.iter().any(|square| known[square].degree == 0) || !bends_evenly(graph, a)
+                    }
+                    None => false,
+                };
                 creases.extend(forms.and_then(Crease::of_all));
-                Some(Self::LENGTH)
+                Some(Self { is_stretched, ..Self::LENGTH })
             }
             Unary::Abs | Unary::Call(_) => None,
         }
@@ -310,12 +327,12 @@ impl Term {
         let number =
             |term: Self| if term.degree == 0 { term.linear.map(|form| form.at_origin) } else { None };
         match op {
-            Binary::Add => Some(Self { degree, is_polynomial, linear: sum(1.0) }),
-            Binary::Sub => Some(Self { degree, is_polynomial, linear: sum(-1.0) }),
+            Binary::Add => Some(Self { degree, is_polynomial, linear: sum(1.0), ..a }),
+            Binary::Sub => Some(Self { degree, is_polynomial, linear: sum(-1.0), ..a }),
             Binary::Mul | Binary::MulOrZero if a.degree + b.degree <= 2 => {
                 let by_b = number(b).and_then(|by| scaled(a.linear, by));
                 let linear = by_b.or_else(|| number(a).and_then(|by| scaled(b.linear, by)));
-                Some(Self { degree: a.degree + b.degree, is_polynomial, linear })
+                Some(Self { degree: a.degree + b.degree, is_polynomial, linear, ..a })
             }
             Binary::Div | Binary::DivOrZero if b.degree == 0 => {
                 Some(Self { linear: number(b).and_then(|by| scaled(a.linear, 1.0 / by)), ..a })
@@ -343,10 +360,14 @@ impl Term {
     }
 }
 
-/// The nodes whose squares a node is the sum of; `None` for other nodes.
+/// The nodes whose squares a node is the sum of; `None` for other nodes, and if there are more than [`MOST_SQUARES`].
 fn squares(graph: &Graph, node: Node) -> Option<Vec<Node>> {
     let (mut waiting, mut found) = (vec![node], Vec::new());
     while let Some(node) = waiting.pop() {
+        // each that waits is a square at least
+        if found.len() + waiting.len() >= MOST_SQUARES {
+            return None;
+        }
         match graph.expr(node) {
             Expr::Binary(Binary::Add, a, b) => waiting.extend([a, b]),
             Expr::Binary(Binary::Mul, a, b) if a == b => found.push(a),
@@ -360,6 +381,18 @@ fn squares(graph: &Graph, node: Node) -> Option<Vec<Node>> {
         }
     }
     Some(found)
+}
+
+/// Whether the root of the sum of the squares of linear forms is a length, or a multiple of one: whether they grow equally fast
+/// in directions at right angles.
+fn are_axes(forms: &[Linear]) -> bool {
+    let squared = |form: &Linear| form.normal.length_squared();
+    let largest = forms.iter().map(squared).fold(0.0, f64::max);
+    let is_small = |difference: f64| difference.abs() <= SAME_BEND * largest;
+    forms.iter().enumerate().all(|(i, form)| {
+        is_small(squared(form) - largest)
+            && forms[..i].iter().all(|other| is_small(form.normal.dot(other.normal)))
+    })
 }
 
 /// Whether a polynomial of degree two bends equally in all directions in which it bends at all.

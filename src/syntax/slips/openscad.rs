@@ -136,7 +136,7 @@ impl Slip<'_> {
         }))
     }
 
-    /// `cylinder(h = 1, r = 2, $fn = 6)` is a prism, and meant as one.
+    /// `cylinder(h = 1, r = 2, $fn = 6)` is a prism, and meant as one. Without both sizes by name, no prism is proposed.
     fn prism_of_few_sides(&self) -> Option<String> {
         let before = self.before();
         let open = unclosed(before)?;
@@ -147,9 +147,9 @@ impl Slip<'_> {
             named.map(|(key, value)| (key.trim(), value.trim())).find(|(key, _)| *key == name).map(|(_, v)| v)
         };
         let sides: u32 = given("$fn")?.parse().ok().filter(|sides| (3..=12).contains(sides))?;
-        let radius = given("r").and_then(|r| r.parse().ok()).unwrap_or(1.0);
+        let radius: f64 = given("r")?.parse().ok().filter(|r: &f64| r.is_finite() && *r > 0.0)?;
         let inner_radius = (radius * libm::cos(std::f64::consts::PI / f64::from(sides)) * 1e4).round() / 1e4;
-        let height = given("h").unwrap_or("1");
+        let height = given("h")?;
         let is_cylinder = last_word(&before[..open]) == "cylinder" && fits(&[height]);
         is_cylinder.then(|| {
             format!(

@@ -280,4 +280,9 @@ fn first_files_of_new_users() {
     let sign = |x: f64, y: f64| hex.sign(rfm::glam::DVec3::new(x, y, 1.5));
     // across its sides, and across its corners
     assert_eq!([sign(1.72, 0.0), sign(1.74, 0.0), sign(0.0, 1.99), sign(0.0, 2.01)], [1.0, -1.0, 1.0, -1.0]);
+    // a size that is not stated as a number by name is not made up
+    for sizes in ["h = 3", "r = 2", "2, 3", "r = w, h = 3"] {
+        let found = messages(&format!("let w = 2\nsolid hex = cylinder({sizes}, $fn = 6)")).to_string();
+        assert!(!found.contains("a prism"), "{sizes}: {found}");
+    }
 }

@@ -519,9 +519,9 @@ enum RfmStatus rfm_load_text_as(const char *text,
                                 struct RfmError **error);
 
 // The same file with other values for `count` of its params, as a program of its own; those that are not named keep
-// theirs. Each is written as `rfm -D` takes it: "r=0.008", or "r=8 mm", whose unit must fit the one that the file writes
-// the param in; a number without a unit is in SI units. `then` is null after a
-// failure, and is not the place of the handle given.
+// theirs. The file is checked with all of them at once. Each is written as `rfm -D` takes it: "r=0.008", or "r=8 mm",
+// whose unit must fit the one that the file writes the param in; a number without a unit is in SI units. `then` is null
+// after a failure, and is not the place of the handle given.
 enum RfmStatus rfm_program_with(const struct RfmProgram *program,
                                 const char *const *settings,
                                 size_t count,

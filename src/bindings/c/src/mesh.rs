@@ -71,7 +71,7 @@ pub unsafe extern "C" fn rfm_mesh(
             (None, Bounds::Within(bounds)) => Grid::around(bounds, Resolution::Cells(cells)),
             (None, Bounds::Empty) => return Ok(RfmMesh(Mesh::default())),
             (None, Bounds::Unbounded) => {
-                return Err(RfmError::bad(NoVolume::Unbounded(this.solid.name().to_string())));
+                return Err(RfmError::bad(NoVolume::asking_for_a_box(this.solid.name())));
             }
         };
         let grid = grid.map_err(RfmError::bad)?;
@@ -127,7 +127,7 @@ unsafe fn optional_box(low: *const f64, high: *const f64) -> Result<Option<Aabb>
     unsafe { read_box(low, high) }.map(Some)
 }
 
-/// The number of vertices of a mesh.
+/// The number of vertices of a mesh; 0 for null.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn rfm_mesh_vertex_count(mesh: *const RfmMesh) -> usize {
     // SAFETY: null, or a mesh
@@ -141,14 +141,14 @@ pub unsafe extern "C" fn rfm_mesh_vertices(mesh: *const RfmMesh) -> *const f64 {
     unsafe { mesh.as_ref() }.map_or(null(), |mesh| mesh.0.positions.as_ptr().cast())
 }
 
-/// The outward unit normals of the vertices, in the same order.
+/// The outward unit normals of the vertices, in the same order. They live as long as the mesh; null for null.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn rfm_mesh_normals(mesh: *const RfmMesh) -> *const f64 {
     // SAFETY: null, or a mesh
     unsafe { mesh.as_ref() }.map_or(null(), |mesh| mesh.0.normals.as_ptr().cast())
 }
 
-/// The number of triangles of a mesh.
+/// The number of triangles of a mesh; 0 for null.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn rfm_mesh_triangle_count(mesh: *const RfmMesh) -> usize {
     // SAFETY: null, or a mesh

@@ -171,9 +171,9 @@ pub unsafe extern "C" fn rfm_load_text_as(
 }
 
 /// The same file with other values for `count` of its params, as a program of its own; those that are not named keep
-/// theirs. Each is written as `rfm -D` takes it: "r=0.008", or "r=8 mm", whose unit must fit the one that the file writes
-/// the param in; a number without a unit is in SI units. `then` is null after a
-/// failure, and is not the place of the handle given.
+/// theirs. The file is checked with all of them at once. Each is written as `rfm -D` takes it: "r=0.008", or "r=8 mm",
+/// whose unit must fit the one that the file writes the param in; a number without a unit is in SI units. `then` is null
+/// after a failure, and is not the place of the handle given.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn rfm_program_with(
     program: *const RfmProgram,
@@ -188,7 +188,7 @@ pub unsafe extern "C" fn rfm_program_with(
         if settings.is_null() && count > 0 {
             return Err(RfmError::bad("settings is null"));
         }
-        let mut changed = this.program.clone();
+        let mut quantities = Vec::new();
         for i in 0..count {
             // SAFETY: the caller promises that number of texts
             let setting = unsafe { read_text(*settings.add(i), "a setting") }?;
@@ -197,12 +197,9 @@ pub unsafe extern "C" fn rfm_program_with(
             };
             let (value, dimension) =
                 parse_quantity(value).map_err(|why| RfmError::bad(format!("`{setting}`: {why}")))?;
-            changed = match dimension {
-                None => changed.with(name.trim(), value)?,
-                dimension => changed.with_quantity(name.trim(), value, dimension)?,
-            };
+            quantities.push((name.trim(), value, dimension));
         }
-        Ok(RfmProgram::new(changed))
+        Ok(RfmProgram::new(this.program.with_quantities(quantities)?))
     };
     // SAFETY: null, or the caller's
     unsafe { hand_out((then, "then"), error, set) }

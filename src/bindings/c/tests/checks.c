@@ -271,6 +271,15 @@ static void programs_tell_of_their_params(void) {
     CHECK(rfm_program_with(program, NULL, 1, &then, NULL) == RFM_BAD_ARGUMENT);
     CHECK(rfm_program_with(NULL, NULL, 0, &then, NULL) == RFM_BAD_ARGUMENT);
     rfm_program_free(program);
+    /* a range from 5 to 2 has no members: only both values together are allowed */
+    const char *range = "rfm 1\nparam m = 1\nparam n = 2\nsolid s = any i in m..n: sphere(i)";
+    CHECK(rfm_load_text(range, "b.rfm", NULL, 0, &program, NULL) == RFM_OK);
+    CHECK(rfm_program_with(program, (const char *[]){"m=5"}, 1, &then, NULL) == RFM_MISTAKES);
+    CHECK(rfm_program_with(program, (const char *[]){"m=5", "n=6"}, 2, &then, NULL) == RFM_OK);
+    CHECK(rfm_solid(then, "s", &solid, NULL) == RFM_OK && rfm_sign(solid, 4.9, 0, 0) == 1.0);
+    rfm_solid_free(solid);
+    rfm_program_free(then);
+    rfm_program_free(program);
 }
 
 /* what is asked of one point has the same answer among many */
@@ -334,13 +343,16 @@ static void solids_and_fluids_have_meshes(void) {
     CHECK(fabs(volume - 6) < 1e-6 && uncertainty >= 0 && uncertainty < 1e-3);
     CHECK(rfm_volume(floor, 96, &volume, NULL, &error) == RFM_BAD_ARGUMENT);
     CHECK(strstr(rfm_error_message(error), "`floor` could not be proven to end") != NULL);
+    CHECK(strstr(rfm_error_message(error), "state the box") == NULL);
     rfm_error_free(error);
     CHECK(rfm_volume(brick, 96, NULL, NULL, NULL) == RFM_BAD_ARGUMENT);
     CHECK(rfm_mesh(brick, 32, NULL, NULL, &mesh, NULL) == RFM_OK);
     CHECK(rfm_mesh_vertex_count(mesh) > 100 && rfm_mesh_triangle_count(mesh) > 200 && fabs(enclosed(mesh) - 36) < 1e-6);
     CHECK(fabs(fabs(rfm_mesh_normals(mesh)[0]) + fabs(rfm_mesh_normals(mesh)[1]) + fabs(rfm_mesh_normals(mesh)[2])) > 0.99);
     rfm_mesh_free(mesh);
-    CHECK(rfm_mesh(floor, 16, NULL, NULL, &mesh, NULL) == RFM_BAD_ARGUMENT && mesh == NULL);
+    CHECK(rfm_mesh(floor, 16, NULL, NULL, &mesh, &error) == RFM_BAD_ARGUMENT && mesh == NULL);
+    CHECK(strstr(rfm_error_message(error), "could not be proven to end anywhere: state the box to mesh") != NULL);
+    rfm_error_free(error);
     CHECK(rfm_mesh(floor, 16, low, high, &mesh, NULL) == RFM_OK && fabs(enclosed(mesh) - 6) < 1e-6);
     rfm_mesh_free(mesh);
     CHECK(rfm_mesh(floor, 16, low, NULL, &mesh, NULL) == RFM_BAD_ARGUMENT);

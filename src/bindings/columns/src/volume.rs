@@ -3,7 +3,7 @@
 use std::fmt;
 
 use rfm::Solid;
-use rfm::mesh::{self, Grid, Mesh, Resolution, VolumeError, Watch};
+use rfm::mesh::{self, Grid, Mesh, Resolution, ThinCells, Volume, VolumeError, Watch};
 use rfm::solid::Bounds;
 
 /// A volume, and what is doubtful about it.
@@ -11,7 +11,7 @@ use rfm::solid::Bounds;
 pub struct Measured {
     /// The volume, m³.
     pub volume: f64,
-    /// How far it may be off, m³; infinite if that is not known, because parts of the solid are not in it.
+    /// How far it may be off, m³; infinite if that is not known, because parts of the solid may not be in it.
     pub error: f64,
     /// What a caller is to be told who did not ask for the error.
     pub doubt: Option<String>,
@@ -35,10 +35,55 @@ pub enum NoVolume {
 impl fmt::Display for NoVolume {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Self::Unbounded(name) => {
-                write!(f, "`{name}` could not be proven to end anywhere: state the box to mesh")
-            }
+            Self::Unbounded(name) => write!(f, "`{name}` could not be proven to end anywhere"),
             Self::Meshes(error) => error.fmt(f),
+        }
+    }
+}
+
+impl NoVolume {
+    /// What a caller is told who may state a box in place of the one that is not known.
+    pub fn asking_for_a_box(name: &str) -> String {
+        format!("{}: state the box to mesh", Self::Unbounded(name.to_string()))
+    }
+}
+
+/// Why the volume of meshes is not trusted.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Cause {
+    /// Parts are thinner than the cells.
+    Thin,
+    /// Nobody knows whether there are such parts.
+    Unsearched,
+    /// Meshes of different cells have different numbers of separate solids.
+    Parts,
+    /// Their volumes differ by much.
+    Differing,
+}
+
+impl Cause {
+    /// `None` if the meshes show all of a solid, with the parts of it that are too thin for the finest of them.
+    fn of(found: &Volume, thin: &ThinCells) -> Option<Self> {
+        let is_thin = thin.count > 0 && !thin.is_wedge;
+        match found.shows_all(Some(thin)) {
+            Some(true) => found.is_uncertain().then_some(Self::Differing),
+            Some(false) if is_thin => Some(Self::Thin),
+            Some(false) => Some(Self::Parts),
+            None => Some(Self::Unsearched),
+        }
+    }
+
+    /// The beginning of a sentence.
+    fn words(self, cells: usize) -> String {
+        match self {
+            Self::Thin => format!("parts of the solid are too thin for {cells} cells"),
+            Self::Unsearched => {
+                format!("it is not known whether parts of the solid are too thin for {cells} cells")
+            }
+            Self::Parts => {
+                format!("meshes of {cells} cells and of fewer show the solid in different numbers of parts")
+            }
+            Self::Differing => format!("meshes of {cells} cells and of fewer differ much in volume"),
         }
     }
 }
@@ -62,6 +107,7 @@ pub fn volume(solid: &Solid, cells: usize, watch: &dyn Watch) -> Result<Measured
         return Ok(Measured::certain(shells.iter().map(|shell| shell.volume).sum(), 0.0));
     }
     let surface = solid.surface(bounds.grown(0.1 * bounds.size().max_element()));
+    let mut cause = Cause::Thin;
     let by_meshes = match mesh::volume(&*surface, bounds, cells, watch) {
         Ok(found) => Some(found),
         Err(VolumeError::TooThin) => None,
@@ -71,8 +117,9 @@ pub fn volume(solid: &Solid, cells: usize, watch: &dyn Watch) -> Result<Measured
         let grid = Grid::around(bounds, Resolution::Cells(cells)).map_err(VolumeError::Grid);
         let thin = grid.and_then(|grid| mesh::thin_cells(&*surface, &grid, watch).map_err(VolumeError::Mesh));
         let thin = thin.map_err(NoVolume::Meshes)?;
-        if found.shows_all(Some(&thin)) == Some(true) && !found.is_uncertain() {
-            return Ok(Measured::certain(found.volume, found.error));
+        match Cause::of(found, &thin) {
+            Some(known) => cause = known,
+            None => return Ok(Measured::certain(found.volume, found.error)),
         }
     }
     match (mesh::by_lines(&*surface, bounds, watch), by_meshes) {
@@ -83,16 +130,16 @@ pub fn volume(solid: &Solid, cells: usize, watch: &dyn Watch) -> Result<Measured
         (Some(lines), _) => {
             let part = lines.error / lines.volume;
             let doubt = (part > LARGE_ERROR).then(|| {
-                format!(
-                    "parts of the solid are too thin for {cells} cells, so its volume is known to {:.0} % only",
-                    100.0 * part
-                )
+                format!("{}, so its volume is known to {:.0} % only", cause.words(cells), 100.0 * part)
             });
             Ok(Measured { volume: lines.volume, error: lines.error, doubt })
         }
         (None, Some(found)) => {
-            let doubt =
-                format!("parts of the solid are too thin for {cells} cells, and its volume is without them");
+            let end = match cause {
+                Cause::Thin => "and its volume is without them",
+                Cause::Unsearched | Cause::Parts | Cause::Differing => "so its volume is not certain",
+            };
+            let doubt = format!("{}, {end}", cause.words(cells));
             Ok(Measured { volume: found.volume, error: f64::INFINITY, doubt: Some(doubt) })
         }
         (None, None) => Err(NoVolume::Meshes(VolumeError::TooThin)),

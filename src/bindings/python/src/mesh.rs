@@ -92,7 +92,7 @@ impl Found {
             (Some(domain), _) => Grid::filling(&domain, resolution),
             (None, Bounds::Within(bounds)) => Grid::around(bounds, resolution),
             (None, Bounds::Empty) => return Ok(Self::empty()),
-            (None, Bounds::Unbounded) => return Err(refused(NoVolume::Unbounded(solid.name().to_string()))),
+            (None, Bounds::Unbounded) => return Err(refused(NoVolume::asking_for_a_box(solid.name()))),
         };
         let grid = grid.map_err(refused)?;
         let field = solid.surface(*grid.bounds());

@@ -297,11 +297,8 @@ impl PyProgram {
     #[pyo3(signature = (**params))]
     fn with_params(&self, py: Python<'_>, params: Option<&Bound<'_, PyDict>>) -> PyResult<Self> {
         let params = given(params)?;
-        let set = |program: Program, param: &Given| match param.dimension {
-            None => program.with(&param.name, param.value),
-            dimension => program.with_quantity(&param.name, param.value, dimension),
-        };
-        let changed = py.detach(|| params.iter().try_fold(self.program.clone(), set));
+        let quantities = params.iter().map(|param| (&*param.name, param.value, param.dimension));
+        let changed = py.detach(|| self.program.with_quantities(quantities));
         changed.map(Self::new).map_err(|error| raised(py, error))
     }
 
