@@ -57,7 +57,7 @@ pub(crate) use derived::hoisted::{Hoisted, Outside, Uniforms, hoisted};
 pub use derived::localised::localised;
 pub(crate) use derived::rigid::RigidMotion;
 pub(crate) use derived::sign::SignRule;
-pub(crate) use derived::trust::{Kind, Trust, is_far_away};
+pub(crate) use derived::trust::{Trust, TrustKind, is_far_away};
 pub(crate) use derived::twin::twin;
 pub use dump::dump;
 pub use form::{Form, Forms};

@@ -13,7 +13,7 @@ use super::programs::on_demand::Lane;
 use crate::field::{Field, GradientsMut, Points};
 use crate::geom::Aabb;
 use crate::interval::Interval;
-use crate::ir::{Kind, Unary};
+use crate::ir::{TrustKind, Unary};
 use crate::precision::Precision;
 
 /// The same for numbers in single precision.
@@ -115,7 +115,7 @@ impl Solid {
     pub(super) fn settled(&self, p: DVec3, found: Contact) -> Contact {
         let trust = self.trust();
         let is_in_doubt =
-            trust.kind != Kind::Doubtful && trust.is_in_doubt(p, found.distance, found.mean_curvature);
+            trust.kind != TrustKind::Doubtful && trust.is_in_doubt(p, found.distance, found.mean_curvature);
         if is_in_doubt { self.contact(p) } else { found }
     }
 

@@ -42,7 +42,7 @@ const SOME_TIME: f64 = 0.37;
 
 /// What the leaves of a formula are.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-pub enum Kind {
+pub enum TrustKind {
     /// Planes, balls and cylinders, and what lengths make of them: the estimate is the distance of the leaf.
     Exact,
     /// Other quadrics, and lengths in stretched coordinates: the estimate is exact along a normal, or nearly so, which may not
@@ -55,7 +55,7 @@ pub enum Kind {
 /// What is known of the estimates of a formula's contacts.
 #[derive(Debug, Clone)]
 pub struct Trust {
-    pub kind: Kind,
+    pub kind: TrustKind,
     /// Whether no doubtful leaf has an edge of its own.
     pub is_smooth: bool,
     creases: Vec<Crease>,
@@ -80,13 +80,13 @@ struct Linear {
 impl Trust {
     /// Of a whole formula.
     pub fn of(graph: &Graph, root: Node) -> Self {
-        let mut trust = Self { kind: Kind::Exact, is_smooth: true, creases: Vec::new() };
+        let mut trust = Self { kind: TrustKind::Exact, is_smooth: true, creases: Vec::new() };
         for leaf in leaves(graph, root, MOST_LEAVES).unwrap_or_default() {
             let mut creases = Vec::new();
             let kind = kind_of_leaf(graph, leaf, &mut creases);
             trust.kind = trust.kind.max(kind);
             trust.creases.extend(creases);
-            trust.is_smooth &= kind != Kind::Doubtful || is_smooth(graph, leaf);
+            trust.is_smooth &= kind != TrustKind::Doubtful || is_smooth(graph, leaf);
         }
         trust.creases.truncate(MOST_CREASES);
         trust
@@ -95,7 +95,7 @@ impl Trust {
     /// Whether the estimate at a point, by so much, is to be compared with the signs before and behind it.
     #[inline]
     pub fn is_doubtful_at(&self, p: DVec3, distance: f64) -> bool {
-        self.kind == Kind::Doubtful || self.is_on_crease(p, distance)
+        self.kind == TrustKind::Doubtful || self.is_on_crease(p, distance)
     }
 
     /// Whether a point is where a formula has one slope on each side.
@@ -115,7 +115,7 @@ impl Trust {
 
     /// Formulas with edges of their own, as those of blends and rounded solids, have too many of such places.
     fn is_looked_around(&self) -> bool {
-        self.kind == Kind::Bent || self.kind == Kind::Doubtful && self.is_smooth
+        self.kind == TrustKind::Bent || self.kind == TrustKind::Doubtful && self.is_smooth
     }
 
     /// Whether an estimate may have to be compared with signs at all.
@@ -127,7 +127,7 @@ impl Trust {
     /// Whether the formula may bend although it is flat at a point: in the middle of a valley.
     #[inline]
     pub fn may_be_flat(&self, distance: f64, mean_curvature: f64) -> bool {
-        self.kind == Kind::Doubtful && self.is_smooth && (distance * mean_curvature).abs() <= FLAT
+        self.kind == TrustKind::Doubtful && self.is_smooth && (distance * mean_curvature).abs() <= FLAT
     }
 
     /// Whether some of the estimates at points may have to be compared with signs: one test for all, without branches.
@@ -135,13 +135,13 @@ impl Trust {
     pub fn has_doubts<T: Real>(&self, points: [&[T]; 3], distance: &[T], curvature: &[T]) -> bool {
         let [x, y, z] = points;
         let point = |i: usize| DVec3::new(x[i].to_f64(), y[i].to_f64(), z[i].to_f64());
-        let mut found = self.kind == Kind::Doubtful;
+        let mut found = self.kind == TrustKind::Doubtful;
         for crease in &self.creases {
             for (i, distance) in distance.iter().enumerate() {
                 found |= is_zero(crease.first, point(i), distance.to_f64());
             }
         }
-        if self.kind == Kind::Bent {
+        if self.kind == TrustKind::Bent {
             for (i, (distance, curvature)) in distance.iter().zip(curvature).enumerate() {
                 found |= bends_around(point(i), distance.to_f64(), curvature.to_f64());
             }
@@ -193,7 +193,7 @@ impl Crease {
 }
 
 /// The kind of a formula that no logic joins, and the creases within it.
-fn kind_of_leaf(graph: &Graph, leaf: Node, creases: &mut Vec<Crease>) -> Kind {
+fn kind_of_leaf(graph: &Graph, leaf: Node, creases: &mut Vec<Crease>) -> TrustKind {
     let mut terms: FxHashMap<Node, Term> = FxHashMap::default();
     for node in graph.cone(leaf) {
         let mut term = Term::of(graph, node, &terms, creases).unwrap_or(Term::OTHER);
@@ -202,11 +202,11 @@ fn kind_of_leaf(graph: &Graph, leaf: Node, creases: &mut Vec<Crease>) -> Kind {
     }
     let Term { degree, is_polynomial, is_stretched, .. } = terms[&leaf];
     match degree {
-        0..=2 if is_stretched => Kind::Bent,
-        0 | 1 => Kind::Exact,
-        2 if is_polynomial && !bends_evenly(graph, leaf) => Kind::Bent,
-        2 => Kind::Exact,
-        _ => Kind::Doubtful,
+        0..=2 if is_stretched => TrustKind::Bent,
+        0 | 1 => TrustKind::Exact,
+        2 if is_polynomial && !bends_evenly(graph, leaf) => TrustKind::Bent,
+        2 => TrustKind::Exact,
+        _ => TrustKind::Doubtful,
     }
 }
 

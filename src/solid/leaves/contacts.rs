@@ -3,7 +3,7 @@
 use glam::DVec3;
 
 use super::leaf_set::Leaves;
-use crate::ir::Kind;
+use crate::ir::TrustKind;
 use crate::solid::confirm::{Surface, confirmed};
 use crate::solid::contact::{Contact, SURE};
 
@@ -37,7 +37,7 @@ impl Leaves {
     pub fn contact(&self, leaf: u32, p: DVec3) -> Contact {
         let estimate = self.estimated_contact(leaf, p);
         let trust = self.trust(leaf);
-        if trust.kind != Kind::Doubtful {
+        if trust.kind != TrustKind::Doubtful {
             return estimate;
         }
         confirmed(&LeafSurface { leaves: self, leaf }, trust, p, estimate, SURE * p.abs().max_element())

@@ -5,8 +5,9 @@
  * omega > 0 inside a solid, 0 on its surface, < 0 outside. Lengths are in metres, times in seconds.
  *
  * Handles are opaque. A program, a solid or a mesh may be used by any number of threads at a time; it is freed once,
- * when nobody uses it any more. A solid does not need its program after it was made, nor a mesh its solid. Null handles are no errors of the
- * program: questions about them give NaN or RFM_BAD_ARGUMENT, and to free them does nothing.
+ * when nobody uses it any more. A solid does not need its program after it was made, nor a mesh its solid. Null handles
+ * are no errors of the program: questions about them give NaN or RFM_BAD_ARGUMENT, counts 0, and to free them does
+ * nothing.
  *
  * Functions that may fail return RFM_OK or what went wrong. The parameter `error` may be null; otherwise it gets an
  * error object, to be freed with rfm_error_free, or null after RFM_OK. No function throws or ends the process.
@@ -17,7 +18,8 @@
  *
  * Columns are given by a pointer to the first number and the distance between two numbers in bytes, so numbers may lie
  * in records: { &p[0].x, &p[0].y, &p[0].z, sizeof p[0] }. Results may lie in the same records as the points, or
- * replace them. Functions with columns run on the calling thread, but for rfm_fluid_surface; results do not depend on how points are divided.
+ * replace them. Functions with columns run on the calling thread, but for rfm_fluid_surface; results do not depend on
+ * how points are divided.
  */
 
 #ifndef RFM_H
@@ -319,8 +321,8 @@ enum RfmStatus rfm_contact_many_f32(const struct RfmSolid *solid,
 
 // Puts particles that are inside a solid, or on its surface, back outside, at most `reach` metres away. Those that are not
 // deep in it go to the nearest place, others to where the formula's slope leads if that is within reach, otherwise the
-// shortest way found along an axis, and if there is none, one found in all directions; each may be farther. Reflects their velocities relative to that of the surface:
-// the part `restitution` of the normal speed returns, and the tangential speed loses at most `friction` times the change
+// shortest way found along an axis, and if there is none, one found in all directions; each may be farther. Reflects their velocities
+// relative to that of the surface: the part `restitution` of the normal speed returns, and the tangential speed loses at most `friction` times the change
 // of the normal speed. Particles that stay outside keep their bits.
 // `collisions` may be null. The first call for a solid of many parts takes longer, because it finds out which of them
 // matter where; see rfm_solid_within.
@@ -340,7 +342,7 @@ enum RfmStatus rfm_error_status(const struct RfmError *error);
 // What happened, as `rfm` prints it. It lives as long as the error object; empty for null.
 const char *rfm_error_message(const struct RfmError *error);
 
-// The number of messages about a file.
+// The number of messages about a file; 0 for null.
 size_t rfm_error_count(const struct RfmError *error);
 
 // Message `index` about a file; false if there are not so many.
@@ -473,16 +475,16 @@ enum RfmStatus rfm_fluid_surface(size_t count,
                                  struct RfmMesh **mesh,
                                  struct RfmError **error);
 
-// The number of vertices of a mesh.
+// The number of vertices of a mesh; 0 for null.
 size_t rfm_mesh_vertex_count(const struct RfmMesh *mesh);
 
 // The vertices of a mesh, m: x, y and z of each after one another. They live as long as the mesh; null for null.
 const double *rfm_mesh_vertices(const struct RfmMesh *mesh);
 
-// The outward unit normals of the vertices, in the same order.
+// The outward unit normals of the vertices, in the same order. They live as long as the mesh; null for null.
 const double *rfm_mesh_normals(const struct RfmMesh *mesh);
 
-// The number of triangles of a mesh.
+// The number of triangles of a mesh; 0 for null.
 size_t rfm_mesh_triangle_count(const struct RfmMesh *mesh);
 
 // The triangles of a mesh: the numbers of three vertices each, from 0, counter-clockwise as seen from outside. They live as
@@ -528,19 +530,19 @@ enum RfmStatus rfm_program_with(const struct RfmProgram *program,
                                 struct RfmProgram **then,
                                 struct RfmError **error);
 
-// The number of solids of a program.
+// The number of solids of a program; 0 for null.
 size_t rfm_solid_count(const struct RfmProgram *program);
 
 // The name of solid `index` of a program; null if there are not so many.
 const char *rfm_solid_name(const struct RfmProgram *program, size_t index);
 
-// The number of params of a program.
+// The number of params of a program; 0 for null.
 size_t rfm_param_count(const struct RfmProgram *program);
 
 // Param `index` of a program, in the order of the file; false if there are not so many.
 bool rfm_param(const struct RfmProgram *program, size_t index, struct RfmParamInfo *param);
 
-// The number of messages that do not prevent the use of a program.
+// The number of messages that do not prevent the use of a program; 0 for null.
 size_t rfm_warning_count(const struct RfmProgram *program);
 
 // Message `index` of those that do not prevent the use of a program; false if there are not so many. `rfm check` also

@@ -207,7 +207,7 @@ pub unsafe extern "C" fn rfm_error_message(error: *const RfmError) -> *const c_c
     unsafe { error.as_ref() }.map_or(c"".as_ptr(), |error| error.message.as_ptr())
 }
 
-/// The number of messages about a file.
+/// The number of messages about a file; 0 for null.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn rfm_error_count(error: *const RfmError) -> usize {
     // SAFETY: null, or an error object

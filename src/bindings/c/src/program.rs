@@ -231,7 +231,7 @@ pub unsafe fn hand_out<T>(
     unsafe { attempt(error, work) }
 }
 
-/// The number of solids of a program.
+/// The number of solids of a program; 0 for null.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn rfm_solid_count(program: *const RfmProgram) -> usize {
     // SAFETY: null, or a program
@@ -246,7 +246,7 @@ pub unsafe extern "C" fn rfm_solid_name(program: *const RfmProgram, index: usize
     name.map_or(null(), |name| name.as_ptr())
 }
 
-/// The number of params of a program.
+/// The number of params of a program; 0 for null.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn rfm_param_count(program: *const RfmProgram) -> usize {
     // SAFETY: null, or a program
@@ -273,7 +273,7 @@ pub unsafe extern "C" fn rfm_param(
     true
 }
 
-/// The number of messages that do not prevent the use of a program.
+/// The number of messages that do not prevent the use of a program; 0 for null.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn rfm_warning_count(program: *const RfmProgram) -> usize {
     // SAFETY: null, or a program
