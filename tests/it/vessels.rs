@@ -509,8 +509,7 @@ scene full {{
 }}"
         ))
     };
-    let mut moving =
-        stirred(&format!("box([0.16, -1, -1], [0.18, 1, 1]) or box([-1, -1, 0.2], [0.18, 1, 0.22])"));
+    let mut moving = stirred("box([0.16, -1, -1], [0.18, 1, 1]) or box([-1, -1, 0.2], [0.18, 1, 0.22])");
     run_to(&mut moving, 0.1);
     assert!(
         moving.parameters().is_sealed && moving.stats().max_speed < 1.0,

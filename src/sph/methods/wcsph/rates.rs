@@ -401,7 +401,7 @@ impl Rates<'_> {
         }
         // a gap belongs to the depth before a surface as well
         let returning = if closes_gaps(self.numbers) { depth(filling.whole) } else { filling.depth };
-        let drift = denser + returning * (self.returns(i, filling.whole) - self.into_gap(i, filling));
+        let drift = denser + returning * (self.returns(i, filling.whole) - self.rate_into_gap(i, filling));
         if self.differences { drift + continuity } else { drift }
     }
 
@@ -435,7 +435,7 @@ impl Rates<'_> {
     /// nothing as long as there is room. Away from surfaces gaps are disorder beside walls, which no motion of a wall
     /// closes. (What returns at the rate of a fall is too late: a rod that was lowered into water with 0.1 m/s pushed a gap
     /// of a spacing ahead, and its lift was that of a rod as much longer.)
-    fn into_gap(&self, i: usize, filling: &Filling) -> f64 {
+    fn rate_into_gap(&self, i: usize, filling: &Filling) -> f64 {
         if filling.swept <= 0.0 || !closes_gaps(self.numbers) {
             return 0.0;
         }
