@@ -236,6 +236,11 @@ impl Lowering<'_> {
             return self.fail(diagnostic.at("a path stands in quotes").help(format!("write `\"{path}\"`")));
         }
         let diagnostic = match (later, foreign::value(name, self.in_scene)) {
+            // `solid part = mesh(part)`
+            (Some(later), _) if later.start < span.start && self.is_path_of_a_mesh(span) => diagnostic
+                .at("not defined yet")
+                .label(later, "defined here")
+                .help(format!("the path of a file stands in quotes: write `mesh(\"{name}.stl\")`")),
             (Some(later), _) if later.start < span.start => diagnostic
                 .at("not defined yet")
                 .label(later, "defined here")
@@ -271,6 +276,14 @@ impl Lowering<'_> {
         let rest = self.text.get(span.range().end..).filter(|_| span.source == SourceId::File)?;
         let ending: String = rest.strip_prefix('.')?.chars().take_while(|c| c.is_alphanumeric()).collect();
         ENDINGS.contains(&ending.to_lowercase().as_str()).then(|| format!("{name}.{ending}"))
+    }
+
+    /// Whether a name stands where a mesh has its path.
+    fn is_path_of_a_mesh(&self, span: Span) -> bool {
+        let before = self.text.get(..span.range().start).filter(|_| span.source == SourceId::File);
+        let call = before.and_then(|text| text.trim_end().strip_suffix('('));
+        let head = call.and_then(|text| text.trim_end().strip_suffix("mesh"));
+        head.is_some_and(|head| !head.ends_with(|c: char| c.is_alphanumeric() || c == '_'))
     }
 
     pub fn negate(&mut self, value: &Value, span: Span) -> Value {
