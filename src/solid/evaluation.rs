@@ -83,7 +83,8 @@ impl Solid {
     /// Distance, normal and curvature of the surface as seen from a point: accurate near the surface, an
     /// estimate far away, but never 0 off the surface. At axes, on creases and in the middle of valleys, where ω and its
     /// derivatives say little of the distance, the nearest place is looked for by the sign. Where the derivatives say nothing
-    /// and no surface is found, as beside an empty solid, the distance is infinite.
+    /// and no surface is found, as beside an empty solid, the distance is infinite. Solids of more than 256 different formulas
+    /// are not looked into for such axes, creases and valleys: their distances are the estimates of these formulas.
     pub fn contact(&self, p: DVec3) -> Contact {
         self.contact_or_search(p, &OnceCell::new())
     }

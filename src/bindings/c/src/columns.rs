@@ -413,9 +413,10 @@ pub unsafe extern "C" fn rfm_contact_many_f32(
 
 /// Puts particles that are inside a solid, or on its surface, back outside, at most `reach` metres away. Those that are not
 /// deep in it go to the nearest place, others to where the formula's slope leads if that is within reach, otherwise the
-/// shortest way found along an axis, and if there is none, one found in all directions; each may be farther. Reflects their velocities
-/// relative to that of the surface: the part `restitution` of the normal speed returns, and the tangential speed loses at most `friction` times the change
-/// of the normal speed. Particles that stay outside keep their bits.
+/// shortest way found along an axis, and if there is none, one found in all directions; each may be farther.
+/// Reflects their velocities relative to that of the surface: the part `restitution` of the normal speed returns, and the
+/// tangential speed loses at most `friction` times the change of the normal speed. Particles that stay outside keep their
+/// bits.
 /// `collisions` may be null. The first call for a solid of many parts takes longer, because it finds out which of them
 /// matter where; see rfm_solid_within.
 #[unsafe(no_mangle)]
