@@ -55,7 +55,7 @@ fn short_hash(text: &str) -> u32 {
 impl Experiment {
     /// A fingerprint of all that determines the bits of a state: the fluid, the box, the obstacles and the
     /// method's numbers. The length of steps, the length of the run and what it saves are not part of it, so
-    /// a run may continue from a [`Checkpoint`](crate::sph::Checkpoint) with other ones.
+    /// a run may continue from a [`Checkpoint`] with other ones.
     pub fn fingerprint(&self) -> [u8; 32] {
         let scene = &self.scene;
         let fluid = &scene.fluid;
