@@ -441,7 +441,7 @@ impl Rates<'_> {
         }
         let rest = self.parameters.rest_density;
         let gap = self.density[i] - rest * filling.whole / self.mean_filled - LOOSE * rest;
-        let at_surface = (self.missing[i] / LOOSE).min(1.0);
+        let at_surface = (self.missing[i] / (2.0 * LOOSE)).min(1.0);
         2.0 * rest * filling.swept * at_surface * (gap / (LOOSE * rest)).clamp(0.0, 1.0)
     }
 }
