@@ -73,7 +73,8 @@ impl Interval {
         Self::new(lo, hi)
     }
 
-    /// The same for many neighbours, or up to twice as many: none is farther than that part of the number, or the smallest number.
+    /// Wider by so many neighbours of each end, or up to twice as many, in one step: none is farther away than a rounding
+    /// error of the end, or the smallest number above zero.
     fn widened_at_once(self, ulps: f64) -> Self {
         let step = |end: f64| match end.is_finite() {
             true => ulps * (f64::EPSILON * end.abs() + f64::from_bits(1)),

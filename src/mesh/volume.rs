@@ -57,7 +57,7 @@ impl Volume {
         (self.volume - lines.volume).abs() <= self.error + lines.error
     }
 
-    /// The same with errors as large as those of the lines: what they do not meet, meshes may not show either.
+    /// This volume with errors at least as large as those along lines: meshes may not show what lines do not meet.
     #[must_use]
     pub fn trusted_no_more_than(self, lines: &ByLines) -> Self {
         let (error, area_error) = (self.error.max(lines.error), self.area_error.max(lines.area_error));

@@ -78,7 +78,7 @@ struct Linear {
 }
 
 impl Trust {
-    /// Of a whole formula.
+    /// That of a whole formula.
     pub fn of(graph: &Graph, root: Node) -> Self {
         let mut trust = Self { kind: TrustKind::Exact, is_smooth: true, creases: Vec::new() };
         for leaf in leaves(graph, root, MOST_LEAVES).unwrap_or_default() {
@@ -240,7 +240,7 @@ struct Term {
 impl Term {
     const NUMBER: Self = Self { degree: 0, is_polynomial: true, is_stretched: false, linear: None };
 
-    /// Of a higher degree, or of none.
+    /// What has a higher degree than two, or none.
     const OTHER: Self = Self { degree: 3, is_polynomial: false, is_stretched: false, linear: None };
 
     const LENGTH: Self = Self { degree: 1, is_polynomial: false, is_stretched: false, linear: None };

@@ -2,15 +2,15 @@
 //!
 //! Where a vessel is pushed, a pressure that is linear in space accelerates all of the fluid alike, and stirs none of it.
 //! The sums over pairs find its gradient only up to the disorder of the particles, so that a solve leaves each particle
-//! with a part of the acceleration of its own: a tank that is pushed with 2 m/s² was stirred by 0.2 m/s at most, 0.03 in the
-//! mean, and its load was 2 % too large. So the mean acceleration ā of each body of fluid acts on all of its particles as it is, and the
-//! pressure −ρ₀·ā·x is added as the hydrostatic one is ([`hydrostatic`](super::hydrostatic)): both are the pressure
-//! under the gravity g − ā that the vessel feels. The solver finds what is left.
+//! with a part of the acceleration of its own: a tank that is pushed with 2 m/s² was stirred by 0.2 m/s at most, 0.03 in
+//! the mean, and its load was 2 % too large. So the mean acceleration ā of each body of fluid acts on all of its
+//! particles alike, and the pressure −ρ₀·ā·x is added as the hydrostatic one is ([`hydrostatic`](super::hydrostatic)):
+//! both are the pressure under the gravity g − ā that the vessel feels. The solver finds what is left.
 //!
-//! ā is learnt from what pressure gives each body, as a mean over the relaxation time: what the mean velocity of the fluid
-//! changes by in a step is noisy. As the solver's pressure in advance ([`ahead`](super::ahead)), it
-//! acts for half of the step before and half of the step after the places where it is found. If it changes, the solver
-//! gives the difference until ā does.
+//! ā is learnt from what pressure gives each body, as a mean over the relaxation time: what the mean velocity of the
+//! fluid changes by in a step is noisy. Like the pressure in advance ([`ahead`](super::ahead)), it acts for half of the
+//! step before and half of the step after the places where it is found. If it changes, the solver gives the difference
+//! until it has been learnt.
 
 use glam::DVec3;
 
@@ -128,7 +128,7 @@ impl Carried {
 
     /// Memory, bytes.
     pub fn bytes(&self) -> usize {
-        self.acceleration.bytes()
+        self.acceleration.bytes() + self.bodies.0.capacity() * size_of::<usize>()
     }
 }
 

@@ -41,7 +41,8 @@ const IMPLICIT_FORCE_FACTOR: f64 = 0.1;
 const SOLVED_FORCE_FACTOR: f64 = 0.15;
 
 /// Strength of the shifting in a fluid that fills its vessel. Flows between cylinders and vortices were off by up to 1.5
-/// times as much with a third of it, when walls counted in the corrections by their normals alone. With twice as much displacements cannot hold the densities in a tank that moves.
+/// times as much with a third of it, when walls counted in the corrections by their normals alone. With twice as much
+/// displacements cannot hold the densities in a tank that moves.
 const SHIFTING_IN_FULL: f64 = 0.3;
 
 /// The support radius of a fluid with surface tension.
