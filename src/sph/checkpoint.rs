@@ -19,7 +19,7 @@ use super::particles::{Particles, Vectors};
 const MAGIC: [u8; 8] = *b"rfm run\n";
 
 /// Version of the layout above and of the meaning of the columns.
-const VERSION: u32 = 5;
+const VERSION: u32 = 6;
 
 /// Names of the columns that hold components of vectors.
 pub(super) const VECTORS: [&str; 9] = [

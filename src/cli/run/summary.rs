@@ -126,7 +126,8 @@ impl Summary {
             particles: watch.now.particles,
             particles_carved: watch.carved,
             particle_mass: simulation.parameters().particle_mass,
-            spacing: simulation.parameters().spacing(),
+            // without the gaps of a packing
+            spacing: (simulation.parameters().particle_mass / simulation.parameters().rest_density).cbrt(),
             rest_density: simulation.parameters().rest_density,
             milliseconds_per_step: watch.spent.as_secs_f64() * 1e3 / steps.max(1) as f64,
             neighbours_per_particle: watch.neighbours.0 / watch.neighbours.1 as f64,

@@ -31,6 +31,9 @@ use crate::sph::{
 const PRESSURE: &str = "pressure ahead";
 const STEP: &str = "step ahead";
 
+/// Fluid whose pressure carries this part of its weight does not fall freely.
+const SUPPORTED: f64 = 0.5;
+
 /// What acts in advance.
 #[derive(Default)]
 pub(super) struct Ahead {
@@ -86,6 +89,24 @@ impl Ahead {
         add_scaled(&mut core.particles.velocity, &self.push, 0.5 * dt);
         self.add_held(core, 0.5 * dt);
         self.dt = dt;
+    }
+
+    /// Lets particles that fall freely go less far: with the velocity of the end of a step they would go too far by half of
+    /// what gravity gives in it. Adds gravity times `factor` to the ways or velocities of particles, as far as they fall;
+    /// `push` is their acceleration by the pressure of the step, m/s². Gravity that depends on the place acts from the
+    /// middle of one step to that of the next anyway.
+    pub fn fall_less(&self, core: &Core, push: &Vectors, ways: &mut Vectors, factor: f64) {
+        let g = core.parameters.pull();
+        if core.gravity_field.is_some() || g == DVec3::ZERO {
+            return;
+        }
+        for (i, push) in push.iter().enumerate() {
+            let carried = (push + 0.5 * self.push.get(i)).length() / g.length();
+            let falls = (1.0 - carried / SUPPORTED).max(0.0);
+            if falls > 0.0 {
+                ways.set(i, ways.get(i) + factor * falls * g);
+            }
+        }
     }
 
     fn add_held(&self, core: &mut Core, time: f64) {

@@ -5,9 +5,12 @@ mod arrest;
 mod carried;
 mod corrected;
 mod full;
+mod gaps;
 mod hydrostatic;
 mod mirrored;
+mod pace;
 mod passes;
+mod relaxation;
 mod rigid;
 mod scheme;
 mod solver;
@@ -194,6 +197,7 @@ impl Declaration for Dfsph {
         "smooth velocity x",
         "smooth velocity y",
         "smooth velocity z",
+        "pace",
     ];
 }
 

@@ -223,6 +223,8 @@ pub(super) struct Squeeze<'a> {
     pub continuation: Continuation,
     /// Whether the motion of walls counts. It does for velocities, but not for accelerations by pressure.
     pub with_walls: bool,
+    /// The part of each particle's walls that is not there, if there are gaps.
+    pub open: Option<&'a [f64]>,
 }
 
 impl PairPass<3, 1, 1> for Squeeze<'_> {
@@ -249,7 +251,8 @@ impl PairPass<3, 1, 1> for Squeeze<'_> {
                 Continuation::Linear => (2.0 * wall.gradient, 2.0 * wall.sweep),
                 Continuation::Barrier => (wall.barrier.gradient, wall.barrier.sweep),
             };
-            gradient.dot(self.velocity.get(i)) - if self.with_walls { sweep } else { 0.0 }
+            let rate = gradient.dot(self.velocity.get(i)) - if self.with_walls { sweep } else { 0.0 };
+            self.open.map_or(rate, |open| (1.0 - open[i]) * rate)
         };
         [rate + self.constants.rest_density * self.walls.in_place_of_fluid(i).map_or(0.0, of_walls)]
     }

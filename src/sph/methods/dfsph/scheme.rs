@@ -87,12 +87,15 @@ use super::super::{
 use super::ahead::Ahead;
 use super::arrest::Arrest;
 use super::carried::Carried;
+use super::gaps::Gaps;
 use super::hydrostatic;
+use super::pace::Pace;
 use super::passes::{Constants, Continuation, Densities, Drag};
+use super::relaxation::{RELAXATION_STEPS, relaxation_time};
 use super::rigid::Rigid;
 use super::solver::{Begin, Errors, Goal, RateOf, Solver};
 use super::walls::Walls;
-use super::{ADVECTION, Dfsph, NOMINAL_SOUND, full};
+use super::{Dfsph, NOMINAL_SOUND, full};
 use crate::sph::{
     checkpoint::{Checkpoint, CheckpointError},
     core::Core,
@@ -102,18 +105,6 @@ use crate::sph::{
     particles::{Vectors, add_scaled},
     reaction::Reaction,
 };
-
-/// The relaxation time, in steps, if the fastest particle moves as far in a step as allowed.
-const RELAXATION_STEPS: f64 = 8.0;
-
-/// The relaxation time at rest, in units of √(h/g), however short the steps are. The debt of a whole column
-/// is paid at once, so with eight steps a column of eighty layers bursts at its start.
-const RELAXATION_FALLS: f64 = 2.0;
-
-/// Maximum relaxation time, in steps of the length that the motion allows. It bounds the time where gravity
-/// is close to zero. Pressure makes the steps themselves shorter; a relaxation time that followed them would
-/// make the pressure grow without end.
-const MOST_RELAXATION_STEPS: f64 = 100.0;
 
 /// Factors of the number of iterations and of the tolerance for a solve that begins without any pressure, as
 /// in the first step, where the whole weight of a column must be found. Without them the pressure of a column
@@ -143,6 +134,7 @@ pub struct DivergenceFree {
     /// The acceleration of the fluid in a sealed vessel as a whole.
     carried: Carried,
     arrest: Arrest,
+    gaps: Gaps,
     /// Stiffness of a lattice of these particles, see [`Wendland::lattice_stiffness`].
     stiffness: f64,
     /// G = −⅓ Σ V r·∇W + ⅓ tr K of each particle.
@@ -157,6 +149,7 @@ pub struct DivergenceFree {
     tension: Tension,
     viscosity: SpinViscosity,
     roughness: Roughness,
+    pace: Pace,
     /// Displacements of this step that are not part of the velocity, m.
     pub(super) displacement: Vectors,
     /// Velocities including the drift by shifting, m/s.
@@ -197,8 +190,9 @@ const LOOK: u64 = 16;
 
 impl Scheme for DivergenceFree {
     fn step(&mut self, core: &mut Core, most: f64) -> Result<f64, StepError> {
-        core.pressure_dt = self.pressure_dt(core);
+        core.pressure_dt = self.pressure_dt(core).min(self.approach_dt(core));
         let dt = core.next_dt(most)?;
+        self.gaps.find(core, &self.walls, relaxation_time(&core.parameters, core.speed, dt));
         // before gravity pulls: the velocity that gravity adds in a step and pressure takes back is no motion
         // along walls
         self.whole = Rigid::of(&core.particles.position, &core.particles.velocity);
@@ -243,6 +237,7 @@ impl Scheme for DivergenceFree {
         checkpoint.set(ROOM, self.room_at_start.into_iter().collect());
         save_crowding(&self.crowding, checkpoint);
         self.roughness.save(checkpoint);
+        self.pace.save(checkpoint);
     }
 
     fn restore(&mut self, checkpoint: &Checkpoint) -> Result<(), CheckpointError> {
@@ -261,7 +256,8 @@ impl Scheme for DivergenceFree {
         self.room_at_start = checkpoint.get(ROOM)?.first().copied();
         self.any_closed = matches!(checkpoint.get(CLOSED)?, [closed] if *closed != 0.0);
         self.crowding = restore_crowding(checkpoint)?;
-        self.roughness.restore(checkpoint)
+        self.roughness.restore(checkpoint)?;
+        self.pace.restore(checkpoint)
     }
 
     fn densities<'a>(&'a self, core: &'a Core) -> &'a [f64] {
@@ -282,6 +278,7 @@ impl Scheme for DivergenceFree {
             + self.ahead.bytes()
             + self.carried.bytes()
             + self.arrest.bytes()
+            + self.gaps.bytes()
     }
 
     fn iterations(&self) -> Option<u32> {
@@ -314,6 +311,7 @@ impl DivergenceFree {
             ahead: Ahead::nothing(n),
             carried: Carried::at_rest(core),
             arrest: Arrest::default(),
+            gaps: Gaps::default(),
             stiffness: 0.0,
             spread: vec![0.0; n],
             crowding: Vectors::default(),
@@ -322,6 +320,7 @@ impl DivergenceFree {
             tension: Tension::default(),
             viscosity: SpinViscosity::default(),
             roughness: Roughness::of(&core.particles.velocity, true),
+            pace: Pace::at_start(core),
             displacement: Vectors::default(),
             drift: Vectors::default(),
             loaded: vec![0.0; n],
@@ -381,7 +380,7 @@ impl DivergenceFree {
         let parameters = &core.parameters;
         let artificial = roughness::factor(
             self.numbers.artificial_viscosity,
-            NOMINAL_SOUND * parameters.expected_speed,
+            NOMINAL_SOUND * self.pace.follow(core),
             parameters.support_radius,
             dt,
         );
@@ -441,6 +440,7 @@ impl DivergenceFree {
         self.forces.correct(core, &self.walls, is_corrected);
         // the compression without pressure; each iteration finds how much of it s takes away
         self.forces.find_rate_of(core, &self.walls, &core.particles.velocity, RateOf::Velocity(&self.whole));
+        self.gaps.open(core, (&mut self.forces, &self.walls), &self.whole, dt);
         let found = (&self.forces.rate[..], &self.loaded[..], &self.debt[..]);
         // particles that have a wall of a spacing between them belong to two bodies
         let bodies = core.parameters.fills_vessel.then(|| bodies(core, core.parameters.spacing()));
@@ -510,6 +510,7 @@ impl DivergenceFree {
         if let Some((crowding, factor)) = shift(shifting, &self.crowding, core) {
             add_scaled(&mut self.drift, crowding, factor);
         }
+        self.ahead.fall_less(core, &self.forces.push, &mut self.drift, -0.5 * dt);
         self.places.find_rate_of(core, &self.walls, &self.drift, RateOf::Velocity(&self.whole));
         let rest = core.parameters.rest_density;
         self.free.clear();
@@ -534,61 +535,7 @@ impl DivergenceFree {
         if let Some((crowding, factor)) = shift(shifting, &self.crowding, core) {
             add_scaled(&mut self.displacement, crowding, factor * dt);
         }
+        self.ahead.fall_less(core, &self.forces.push, &mut self.displacement, -0.5 * dt * dt);
         !is_kept
-    }
-}
-
-/// The time, s, in which a debt is paid back after a step of the length `dt` with the greatest speed `speed`.
-/// Reported pressures are averaged over at most this time.
-///
-/// A step may be short for other reasons than the motion of the fluid: a frame is due, a body jumps, or a
-/// body causes a large acceleration. A debt that was paid back within eight such steps would become a speed
-/// without bound (a still fluid with frames 0.1 ms apart reached 11 m/s). So the time is at least that of
-/// eight steps of the expected motion.
-fn relaxation_time(parameters: &Parameters, speed: f64, dt: f64) -> f64 {
-    // where nothing is expected to move, only frames limit the steps
-    let allowed = parameters.time_step.min(parameters.stable_dt(speed));
-    let most = MOST_RELAXATION_STEPS * allowed;
-    let gravity = parameters.pull().length().max(parameters.most_gravity);
-    let fall = (parameters.support_radius / gravity).sqrt();
-    let falls = if fall.is_finite() { (RELAXATION_FALLS * fall).min(most) } else { 0.0 };
-    let moving = RELAXATION_STEPS * dt;
-    let slow = falls.max(moving);
-    let courant = (dt * speed / (ADVECTION * parameters.spacing())).min(1.0);
-    let in_steps = slow + (moving - slow) * courant;
-    let expected = RELAXATION_STEPS * ADVECTION * parameters.spacing() / speed.max(parameters.expected_speed);
-    in_steps.max(expected.min(most))
-}
-
-#[cfg(test)]
-mod tests {
-    use glam::DVec3;
-
-    use super::*;
-
-    /// Pressure makes steps short. A debt must not become a greater speed by that, whatever gives the fluid
-    /// its weight.
-    #[test]
-    fn a_relaxation_time_does_not_follow_steps_that_pressure_made_short() {
-        let of = |gravity: f64, most_gravity: f64, dt: f64| {
-            let parameters = Parameters {
-                gravity: DVec3::new(0.0, 0.0, -gravity),
-                most_gravity,
-                expected_speed: 3.0,
-                time_step: 1.0,
-                method: Dfsph::default().into(),
-                ..Parameters::paper()
-            };
-            relaxation_time(&parameters, 0.0, dt)
-        };
-        let fall = (Parameters::paper().support_radius / 9.81).sqrt();
-        for (gravity, most_gravity) in [(9.81, 0.0), (0.0, 9.81)] {
-            for dt in [1e-3, 1e-5, 1e-7] {
-                let found = of(gravity, most_gravity, dt);
-                assert!((found / (RELAXATION_FALLS * fall) - 1.0).abs() < 1e-12, "{gravity} {dt}: {found} s");
-            }
-        }
-        // without weight it is the time of the expected motion
-        assert!(of(0.0, 0.0, 1e-7) < 0.5 * fall && of(0.0, 0.0, 1e-7) == of(0.0, 0.0, 1e-5));
     }
 }

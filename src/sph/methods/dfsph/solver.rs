@@ -64,6 +64,8 @@ pub(super) enum Begin {
 pub(super) enum RateOf<'a> {
     /// Velocities of a fluid with this motion as a whole, beside walls that may move.
     Velocity(&'a Rigid),
+    /// The same with gaps before walls: the part of each particle's walls that is not there.
+    BeforeGaps(&'a Rigid, &'a [f64]),
     /// Accelerations or displacements by pressure, to which the motion of walls adds nothing.
     Pressure,
 }
@@ -267,23 +269,30 @@ impl Solver {
     /// Finds the dρ/dt of velocities, or of accelerations in a second.
     pub fn find_rate_of(&mut self, core: &Core, walls: &Walls, velocity: &Vectors, of: RateOf<'_>) {
         let is_completed = self.continuation == Continuation::Linear && walls.mirrors().is_none();
-        let velocity = match of {
-            _ if !is_completed => velocity,
-            RateOf::Velocity(whole) => {
-                walls.complete_velocities(velocity, (&core.particles.position, whole), &mut self.completed);
-                &self.completed
+        let (whole, open) = match of {
+            RateOf::Velocity(whole) => (Some(whole), None),
+            RateOf::BeforeGaps(whole, open) => (Some(whole), Some(open)),
+            RateOf::Pressure => (None, None),
+        };
+        let velocity = if is_completed {
+            let completed = &mut self.completed;
+            match whole {
+                Some(whole) => {
+                    walls.complete_velocities(velocity, (&core.particles.position, whole), open, completed);
+                }
+                None => walls.complete(velocity, completed),
             }
-            RateOf::Pressure => {
-                walls.complete(velocity, &mut self.completed);
-                &self.completed
-            }
+            &self.completed
+        } else {
+            velocity
         };
         let pass = Squeeze {
             constants: Constants::of(&core.parameters),
             walls,
             velocity,
             continuation: self.continuation,
-            with_walls: matches!(of, RateOf::Velocity(_)),
+            with_walls: whole.is_some(),
+            open,
         };
         if let Some(correction) = &self.correction {
             correction.rate(core, pass, &mut self.rate);

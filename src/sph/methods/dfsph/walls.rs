@@ -69,14 +69,22 @@ impl Walls {
         }
     }
 
-    /// Writes r + M·(v − r) of each particle to `completed`, where r is the velocity behind the walls. Across
-    /// the walls it is their velocity, and along them that of the fluid as a whole.
-    pub fn complete_velocities(&self, v: &Vectors, (at, whole): (&Vectors, &Rigid), completed: &mut Vectors) {
+    /// Writes w = r + M·(v − r) of each particle to `completed`, where r is the velocity behind the walls. Across
+    /// the walls it is their velocity, and along them that of the fluid as a whole. Where the part o of a gap is
+    /// `open`, it is w + o·(v − w).
+    pub fn complete_velocities(
+        &self,
+        v: &Vectors,
+        (at, whole): (&Vectors, &Rigid),
+        open: Option<&[f64]>,
+        completed: &mut Vectors,
+    ) {
         completed.clone_from(v);
         for (i, (wall, completion)) in self.near.found() {
             let i = *i as usize;
             let behind = wall.velocity_behind(whole.at(at.get(i)));
-            completed.set(i, behind + *completion * (v.get(i) - behind));
+            let all = behind + *completion * (v.get(i) - behind);
+            completed.set(i, open.map_or(all, |open| all + open[i] * (v.get(i) - all)));
         }
     }
 

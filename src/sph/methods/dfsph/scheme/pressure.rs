@@ -4,6 +4,7 @@
 use glam::DMat3;
 
 use super::super::super::shifting::depth;
+use super::super::ADVECTION;
 use super::super::hydrostatic::Hydrostatic;
 use super::super::passes::{Constants, Field};
 use super::DivergenceFree;
@@ -38,6 +39,15 @@ impl DivergenceFree {
         let greatest = at_walls.fold(in_the_depth, f64::max) / rest;
         let spacing = core.parameters.spacing();
         STABLE * 2.0 * spacing / (self.stiffness * greatest).sqrt()
+    }
+
+    /// The longest step, s, in which no particle comes nearer to a wall, which may move, than it may move in a step.
+    pub(super) fn approach_dt(&self, core: &Core) -> f64 {
+        let approach = self.walls.found().iter().map(|(i, (wall, _))| {
+            let per_gradient = wall.gradient.dot(core.particles.velocity.get(*i as usize)) - wall.sweep;
+            if per_gradient > 0.0 { per_gradient / wall.gradient.length() } else { 0.0 }
+        });
+        ADVECTION * core.parameters.spacing() / approach.fold(0.0, f64::max)
     }
 
     /// The pressure that the fluid of a sealed vessel has as one that is carried along, under gravity and with the bodies

@@ -1,0 +1,70 @@
+//! How fast parts of the fluid move, as seen from the fluid as a whole.
+//!
+//! Artificial viscosity scales with the greatest expected speed. But no damping may depend on a velocity that all of the
+//! fluid has: two drops that collided in flight at 10 m/s kept two thirds of the energy that they kept when their middle was
+//! at rest. So a common velocity at the start does not count, unless walls have turned it into a motion of parts.
+
+use glam::DVec3;
+
+use crate::sph::{
+    checkpoint::{Checkpoint, CheckpointError},
+    core::Core,
+    particles::Vectors,
+};
+
+/// Name of both speeds in a checkpoint.
+const NAME: &str = "pace";
+
+/// Speeds of parts of the fluid.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct Pace {
+    /// The expected one, m/s.
+    expected: f64,
+    /// The greatest so far, m/s.
+    found: f64,
+}
+
+impl Pace {
+    /// Of a fluid at its start: what is expected is the speed at the start and that of a fall.
+    pub fn at_start(core: &Core) -> Self {
+        let velocity = &core.particles.velocity;
+        let fastest = greatest(velocity, DVec3::ZERO);
+        let found = greatest(velocity, mean(velocity));
+        // rounding leaves nothing of equal squares
+        let by_others = (core.parameters.expected_speed.powi(2) - fastest.powi(2)).max(0.0);
+        Self { expected: (by_others + found.powi(2)).sqrt(), found }
+    }
+
+    /// Looks at the velocities of a step. Returns the speed by which motion is damped, m/s.
+    pub fn follow(&mut self, core: &Core) -> f64 {
+        let velocity = &core.particles.velocity;
+        self.found = self.found.max(greatest(velocity, mean(velocity)));
+        self.expected.max(self.found).min(core.parameters.expected_speed)
+    }
+
+    /// Saves both speeds.
+    pub fn save(&self, checkpoint: &mut Checkpoint) {
+        checkpoint.set(NAME, vec![self.expected, self.found]);
+    }
+
+    /// Takes up what a checkpoint saved.
+    ///
+    /// # Errors
+    /// The column that the checkpoint lacks.
+    pub fn restore(&mut self, checkpoint: &Checkpoint) -> Result<(), CheckpointError> {
+        *self = match checkpoint.get(NAME)? {
+            &[expected, found] if expected >= 0.0 && found >= 0.0 => Self { expected, found },
+            _ => return Err(CheckpointError::Column(NAME.into())),
+        };
+        Ok(())
+    }
+}
+
+/// The greatest speed, m/s, as seen from something with the velocity `from`.
+fn greatest(velocity: &Vectors, from: DVec3) -> f64 {
+    velocity.iter().map(|v| (v - from).length_squared()).fold(0.0, f64::max).sqrt()
+}
+
+fn mean(velocity: &Vectors) -> DVec3 {
+    velocity.iter().sum::<DVec3>() / velocity.len().max(1) as f64
+}
