@@ -291,3 +291,37 @@ scene flow {{
         }
     }
 }
+
+/// A gate that is gone leaves the water as if it had never been there: no density is that of half a fluid and half a wall.
+/// (Particles behind it had down to 471 kg/m³, and the flow gained 2 % of energy at the next wall.)
+#[test]
+fn a_gate_that_opens_takes_no_density_along() {
+    let front = |gate: &str, until: f64| {
+        let mut simulation = simulation(&format!(
+            "rfm 1
+solid gate = box([-0.02, -1, -1], [0.02, 1, 1]).move([0, 0, {gate}])
+scene flow {{
+  box {{ min: [-0.2, -0.05, 0], max: [0.3, 0.05, 0.6], restitution: 0 }}
+  obstacle {{ solid: gate, restitution: 0 }}
+  fluid water {{
+    shape: box([-0.2, -0.05, 0], [-0.02, 0.05, 0.3]), density: 1000, spacing: 0.02, viscosity: 0.1,
+    start: hydrostatic, sound_speed: 34
+  }}
+  method: wcsph
+  run {{ until: 1 s }}
+}}"
+        ));
+        run_to(&mut simulation, until);
+        let particles = simulation.particles();
+        let thinnest = particles.density.iter().copied().fold(f64::INFINITY, f64::min);
+        (particles.position.iter().map(|at| at.x).sum::<f64>() / particles.len() as f64, thinnest)
+    };
+    let (never, _) = front("5", 0.14);
+    let (gone, thinnest) = front("if t < 0.001 then 0 else 5", 0.14);
+    // the front has lost its balance with the wall for ten steps, and moves as one at a surface
+    assert!(thinnest > 850.0, "{thinnest} kg/m³");
+    assert!((gone - never).abs() < 0.002, "{gone} m, without a gate {never} m");
+    // at 20 m/s it takes 65 ms until the gate is out of the water
+    let (_, thinnest) = front("20*t", 0.08);
+    assert!(thinnest > 850.0, "{thinnest} kg/m³ behind a gate that is lifted");
+}

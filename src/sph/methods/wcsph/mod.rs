@@ -1,6 +1,7 @@
 //! The weakly compressible method: its numbers, keys and limits. The scheme is in [`scheme`].
 
 mod at_edges;
+mod leaving;
 mod linear;
 mod numbers;
 mod passes;
@@ -316,6 +317,8 @@ impl Declaration for Wcsph {
         "smooth velocity x",
         "smooth velocity y",
         "smooth velocity z",
+        "part of walls",
+        "rate of that part",
     ];
     const OTHER_SUPPORT: Option<(Support, &'static str)> =
         Some((Self::NEAR, "with surface tension or `gradients: differences`"));

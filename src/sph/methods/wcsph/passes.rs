@@ -98,7 +98,7 @@ impl<const LAMINAR: bool, const ARTIFICIAL: bool, const EVEN: bool> Pairs<'_, LA
     }
 }
 
-impl<const LAMINAR: bool, const ARTIFICIAL: bool, const EVEN: bool> PairPass<8, SUMS, 14>
+impl<const LAMINAR: bool, const ARTIFICIAL: bool, const EVEN: bool> PairPass<8, SUMS, 16>
     for Pairs<'_, LAMINAR, ARTIFICIAL, EVEN>
 {
     #[inline(always)]
@@ -113,7 +113,7 @@ impl<const LAMINAR: bool, const ARTIFICIAL: bool, const EVEN: bool> PairPass<8, 
         self.sum(d, r2, own, &other, sums);
     }
 
-    fn finish(&self, i: usize, sums: [f64; SUMS]) -> [f64; 14] {
+    fn finish(&self, i: usize, sums: [f64; SUMS]) -> [f64; 16] {
         self.0.finish(i, Self::CONTENTS, &named(sums))
     }
 }
@@ -159,7 +159,7 @@ impl<const LAMINAR: bool, const ARTIFICIAL: bool> Shifted<'_, LAMINAR, ARTIFICIA
     }
 }
 
-impl<const LAMINAR: bool, const ARTIFICIAL: bool> PairPass<8, SHIFTED_SUMS, 14>
+impl<const LAMINAR: bool, const ARTIFICIAL: bool> PairPass<8, SHIFTED_SUMS, 16>
     for Shifted<'_, LAMINAR, ARTIFICIAL>
 {
     #[inline(always)]
@@ -177,7 +177,7 @@ impl<const LAMINAR: bool, const ARTIFICIAL: bool> PairPass<8, SHIFTED_SUMS, 14>
         sums[SUMS..].copy_from_slice(&denser);
     }
 
-    fn finish(&self, i: usize, sums: [f64; SHIFTED_SUMS]) -> [f64; 14] {
+    fn finish(&self, i: usize, sums: [f64; SHIFTED_SUMS]) -> [f64; 16] {
         let (all, denser) = split(&sums);
         let sums = Sums { denser_along: DVec3::from_array(denser), ..named(all) };
         self.0.finish(i, Pairs::<LAMINAR, ARTIFICIAL, true>::CONTENTS, &sums)
@@ -195,7 +195,7 @@ fn split<V: Copy>(sums: &[V]) -> ([V; SUMS], [V; 3]) {
 #[derive(Clone, Copy)]
 pub(super) struct Differences<'a, const LAMINAR: bool, const ARTIFICIAL: bool>(pub Rates<'a>);
 
-impl<const LAMINAR: bool, const ARTIFICIAL: bool> PairPass<8, DIFFERENCES_SUMS, 14>
+impl<const LAMINAR: bool, const ARTIFICIAL: bool> PairPass<8, DIFFERENCES_SUMS, 16>
     for Differences<'_, LAMINAR, ARTIFICIAL>
 {
     #[inline(always)]
@@ -225,7 +225,7 @@ impl<const LAMINAR: bool, const ARTIFICIAL: bool> PairPass<8, DIFFERENCES_SUMS, 
         }
     }
 
-    fn finish(&self, i: usize, sums: [f64; DIFFERENCES_SUMS]) -> [f64; 14] {
+    fn finish(&self, i: usize, sums: [f64; DIFFERENCES_SUMS]) -> [f64; 16] {
         let (all, denser) = split(&sums);
         let tensor = |from: usize, trace: f64, beside: f64| {
             let [xx, yy, yz, zx, xy] = std::array::from_fn(|k| sums[from + k]);

@@ -30,7 +30,7 @@ const HELD: [f64; 2] = [0.7, 0.8];
 /// Particles that have come to rest in disorder, and the layers of walls beside them, make an error of this
 /// size. With 0 still water eight layers deep sinks by a hundredth, and its pressure is off by twice as much.
 /// With 0.03 water that has splashed stands 2 % too high.
-const LOOSE: f64 = 0.02;
+pub(super) const LOOSE: f64 = 0.02;
 
 /// How far a particle at a wall takes part in the balance of the fluid, 0 to 1, from its Σ V W.
 fn held(filled: f64) -> f64 {
@@ -184,6 +184,9 @@ struct Filling {
     wall_rate: f64,
     /// The part of that by which walls themselves move towards the particle.
     swept: f64,
+    /// What walls add to the density, kg/m³, and how fast that grows by the motion of the particle, kg/m³/s.
+    of_walls: f64,
+    rate_of_walls: f64,
     /// `filled` with what kernels miss before a free surface.
     whole: f64,
     /// How far the particle belongs to the depth of the fluid, 0 to 1.
@@ -209,9 +212,10 @@ struct Pressed {
 // inlined, so that what a pass does not sum costs it nothing
 impl Rates<'_> {
     /// The results of a particle: acceleration, rate of the density and the density that places say, its drift, the part of
-    /// its kernel that is filled, crowding, the mean velocity around it, and how far it belongs to the depth.
+    /// its kernel that is filled, crowding, the mean velocity around it, how far it belongs to the depth, and what walls add
+    /// to the density, with the rate of that by the particle's motion.
     #[inline(always)]
-    pub fn finish(&self, i: usize, contents: Contents, sums: &Sums) -> [f64; 14] {
+    pub fn finish(&self, i: usize, contents: Contents, sums: &Sums) -> [f64; 16] {
         let parameters = self.parameters;
         let rest = parameters.rest_density;
         let velocity = self.velocity.get(i);
@@ -252,6 +256,8 @@ impl Rates<'_> {
             around.y,
             around.z,
             depth,
+            filling.of_walls,
+            filling.rate_of_walls,
         ]
     }
 
@@ -297,13 +303,15 @@ impl Rates<'_> {
         let (mut crowding, mut spread) = (crowding_by_pairs, self.steepness * sums.squares / 3.0);
         let (mut filled, mut places) = (by_weight / (rest * self.lattice), by_weight);
         let (mut wall_rate, mut swept) = (0.0, 0.0);
+        let (mut of_walls, mut rate_of_walls) = (0.0, 0.0);
         if let Some(wall) = wall {
             crowding += wall.gradient;
             spread += wall.share();
             wall_rate = wall.gradient.dot(velocity) - wall.sweep;
             swept = wall_rate.min(-wall.sweep);
             filled += wall.filled;
-            places += 2.0 * rest * wall.part;
+            (of_walls, rate_of_walls) = (2.0 * rest * wall.part, 2.0 * rest * wall.gradient.dot(velocity));
+            places += of_walls;
         }
         // a gap beside a wall is no free surface
         let missing = self.missing[i];
@@ -311,7 +319,20 @@ impl Rates<'_> {
         let depth = depth(if contents.even { spread } else { filled });
         let smooth = if self.differences { depth } else { 0.0 };
         let mean = if smooth > 0.0 { 1.0 + smooth * (1.0 / spread - 1.0) } else { 1.0 };
-        Filling { crowding_by_pairs, crowding, filled, places, wall_rate, swept, whole, depth, smooth, mean }
+        Filling {
+            crowding_by_pairs,
+            crowding,
+            filled,
+            places,
+            wall_rate,
+            swept,
+            of_walls,
+            rate_of_walls,
+            whole,
+            depth,
+            smooth,
+            mean,
+        }
     }
 
     /// The force by pressures, and how fast the fluid is compressed. Where pressures do not act by differences, a

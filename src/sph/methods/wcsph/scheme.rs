@@ -79,6 +79,7 @@ use super::super::{
     viscosity::SpinViscosity,
 };
 use super::at_edges::Edges;
+use super::leaving::OfWalls;
 use super::numbers::{Numbers, at_rest, sums_crowding, tait};
 use super::passes::{Differences, Missing, Pairs, Shifted};
 use super::rates::{Rates, closes_gaps};
@@ -120,6 +121,8 @@ pub struct Weakly {
     /// [`SURFACE_STEPS`] steps.
     missing: Vec<f64>,
     roughness: Roughness,
+    /// What walls add to the densities.
+    of_walls: OfWalls,
     /// Working memory: the Q and the drift that a sum finds.
     found: [Vec<f64>; 2],
     tension: Tension,
@@ -168,6 +171,7 @@ impl Scheme for Weakly {
             checkpoint.set(MEAN_FILLED, vec![self.mean_filled]);
         }
         self.roughness.save(checkpoint);
+        self.of_walls.save(checkpoint);
     }
 
     fn restore(&mut self, checkpoint: &Checkpoint) -> Result<(), CheckpointError> {
@@ -186,7 +190,8 @@ impl Scheme for Weakly {
                 self.mean_filled = *mean;
             }
         }
-        self.roughness.restore(checkpoint)
+        self.roughness.restore(checkpoint)?;
+        self.of_walls.restore(checkpoint)
     }
 
     fn densities<'a>(&'a self, _core: &'a Core) -> &'a [f64] {
@@ -203,6 +208,7 @@ impl Scheme for Weakly {
             + self.tension.bytes()
             + 8 * self.edge_compression.capacity()
             + self.roughness.bytes()
+            + self.of_walls.bytes()
             + self.viscosity.bytes()
             + self.walls.bytes()
     }
@@ -243,6 +249,7 @@ impl Weakly {
             excess: Vec::new(),
             missing: vec![0.0; n],
             roughness: Roughness::of(&core.particles.velocity, numbers.gradients == Gradients::Pairs),
+            of_walls: OfWalls::nothing(n),
             found: [vec![0.0; n], vec![0.0; n]],
             tension: Tension::default(),
             edge_compression: Vec::new(),
@@ -260,8 +267,9 @@ impl Weakly {
     fn sort(&mut self, core: &mut Core) {
         let own =
             [&mut self.places, &mut self.rate, &mut self.earlier_rate, &mut self.drift, &mut self.missing];
-        let mut columns: SmallVec<[&mut Vec<f64>; 11]> = SmallVec::from_iter(own);
+        let mut columns: SmallVec<[&mut Vec<f64>; 13]> = SmallVec::from_iter(own);
         columns.extend(self.roughness.columns());
+        columns.extend(self.of_walls.columns());
         columns.extend(self.common.iter_mut().flat_map(Common::columns));
         core.sort(&mut columns);
         self.tension.find_wet_walls(core);
@@ -310,6 +318,7 @@ impl Weakly {
         let Vectors { x: cx, y: cy, z: cz } = &mut self.crowding;
         let [mut places, mut drift] = std::mem::take(&mut self.found);
         std::mem::swap(&mut self.rate, &mut self.earlier_rate);
+        let [of_walls, rate_of_walls] = self.of_walls.found();
         let out = [
             &mut x[..],
             y,
@@ -325,6 +334,8 @@ impl Weakly {
             sy,
             sz,
             &mut self.depth,
+            of_walls,
+            rate_of_walls,
         ];
         self.missing.resize(n, 0.0);
         if closes_gaps(numbers) && core.steps.is_multiple_of(SURFACE_STEPS) {
@@ -375,6 +386,10 @@ impl Weakly {
         if dt > 0.0 {
             self.correct_densities(core, &places, &drift, dt);
         }
+        if dt > 0.0 && closes_gaps(&self.numbers) {
+            self.of_walls.lift(&core.parameters, &mut core.particles.density, dt);
+        }
+        self.of_walls.advance();
         self.found = [std::mem::replace(&mut self.places, places), std::mem::replace(&mut self.drift, drift)];
         self.last_dt = dt;
         core.pull(1.0);
