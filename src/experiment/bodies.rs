@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use super::wall_speed::{self, Driven};
-use super::{rigid_parts, vector_field};
+use super::{rigid_parts, switched::Switched, vector_field};
 use crate::compile::Error;
 use crate::field::{Moving, Walls};
 use crate::ir::Node;
@@ -90,14 +90,19 @@ fn body(
     } else {
         Vec::new()
     };
+    let switched = (whole.moves() && parts.is_empty())
+        .then(|| Switched::of(&program.module().graph, shape, &whole, scene.run.until, engine))
+        .flatten()
+        .filter(|_| !rigid_parts::keeps_its_shape(program, shape, scene.run.until));
+    let switched = switched.map(|switched| switched as Arc<dyn Moving>);
     let changing = (has_maps && parts.is_empty())
-        .then(|| changing_shape(program, shape, &whole, scene, parameters))
+        .then(|| changing_shape(program, shape, (&whole, switched.clone()), scene, parameters))
         .flatten();
     let obstacle = Obstacle {
         parts,
         changing,
         field: at_rest(&solid, scene, parameters),
-        moving: whole.moves().then(|| in_motion(&whole, scene, parameters)),
+        moving: whole.moves().then(|| switched.unwrap_or_else(|| in_motion(&whole, scene, parameters))),
         restitution: skin.bounce.restitution,
         friction: skin.bounce.friction,
         slip: skin.slip,
@@ -112,7 +117,7 @@ fn body(
 fn changing_shape(
     program: &Program,
     shape: Node,
-    whole: &Solid,
+    (whole, switched): (&Solid, Option<Arc<dyn Moving>>),
     scene: &Scene,
     parameters: &Parameters,
 ) -> Option<ChangingShape> {
@@ -120,12 +125,15 @@ fn changing_shape(
     if whole.has_many_leaves() || rigid_parts::keeps_its_shape(program, shape, until) {
         return None;
     }
+    if let Some(body) = switched {
+        return Some(ChangingShape { body, until, intervals: 1, switches: true });
+    }
     let way = CHANGE * parameters.support_radius;
     let wanted = wall_speed::time_for(whole, way, &scene.domain, until)?
         .max(parameters.stable_dt(parameters.expected_speed).min(parameters.time_step));
     // a whole number of them, so that none is beyond the end
     let intervals = (until / wanted).ceil().max(LEAST_CHANGES) as u64;
-    Some(ChangingShape { body: Arc::new(whole.clone()), until, intervals })
+    Some(ChangingShape { body: Arc::new(whole.clone()), until, intervals, switches: false })
 }
 
 /// The cheapest field that represents a solid in the box of a scene.

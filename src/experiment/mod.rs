@@ -30,6 +30,7 @@ mod parameters;
 mod probes;
 mod rigid_parts;
 mod room;
+mod switched;
 mod wall_speed;
 mod weight;
 

@@ -145,6 +145,11 @@ pub trait Moving: Send + Sync {
         None
     }
 
+    /// Whether the obstacle is known to be the same at two times, s. The default knows nothing.
+    fn is_same(&self, _a: f64, _b: f64) -> bool {
+        false
+    }
+
     /// Whether the obstacle moves. If not, it is the same during every step.
     fn moves(&self) -> bool {
         true

@@ -53,7 +53,7 @@ pub(crate) use derived::forward::forward_gradient;
 pub(crate) use derived::framed::{Framed, framed};
 pub use derived::gradient::gradient;
 pub use derived::gradient::gradient_and_rate;
-pub(crate) use derived::hoisted::{Hoisted, Outside, Uniforms, hoisted};
+pub(crate) use derived::hoisted::{Hoisted, Outside, Uniforms, at_instant, hoisted};
 pub use derived::localised::localised;
 pub(crate) use derived::rigid::RigidMotion;
 pub(crate) use derived::sign::SignRule;

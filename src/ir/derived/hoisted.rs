@@ -130,3 +130,19 @@ pub fn hoisted(graph: &Graph, outputs: &[Node], outside: Outside) -> Hoisted {
     let ranges = RangeEvaluator::new(&alone, roots.last().copied().unwrap_or(outputs[0]));
     Hoisted { graph: rest, outputs, uniforms: Uniforms { graph: alone, interpreter, ranges, roots }, image }
 }
+
+/// The formula at an instant: what depends on time alone is a number, which has no range.
+pub fn at_instant(graph: &Graph, root: Node, time: f64) -> (Graph, Node) {
+    let Hoisted { graph, outputs, uniforms, .. } = hoisted(graph, &[root], Outside::Time);
+    let values = uniforms.at(time, &[]);
+    let mut now = Graph::like(&graph);
+    let mut image: Vec<Node> = Vec::with_capacity(graph.len());
+    for (node, expr) in graph.nodes() {
+        let new = match expr {
+            Expr::Uniform(k) => Expr::Constant(values[k as usize].to_bits()),
+            _ => expr.map(|operand| image[operand.index()]),
+        };
+        image.push(now.intern(new, graph.span(node)));
+    }
+    (now, image[outputs[0].index()])
+}

@@ -4,10 +4,7 @@ use std::borrow::Cow;
 
 use crate::geom::Aabb;
 use crate::interval::Interval;
-use crate::ir::{
-    Contracted, Contractor, Expr, Graph, Hoisted, Node, Outside, Region, SignRule, Wanted, contract_linear,
-    hoisted,
-};
+use crate::ir::{Contracted, Contractor, Graph, Node, Region, SignRule, Wanted, at_instant, contract_linear};
 use crate::solid::construction::Solid;
 
 use super::search::{Effort, NODES_PER_WORK, SEARCH_RADIUS, Shrink};
@@ -112,22 +109,6 @@ pub fn at_its_time(solid: &Solid) -> (Cow<'_, Graph>, Node) {
     } else {
         (Cow::Borrowed(graph), root)
     }
-}
-
-/// The formula at an instant: what depends on time alone is a number, which has no range.
-fn at_instant(graph: &Graph, root: Node, time: f64) -> (Graph, Node) {
-    let Hoisted { graph, outputs, uniforms, .. } = hoisted(graph, &[root], Outside::Time);
-    let values = uniforms.at(time, &[]);
-    let mut now = Graph::like(&graph);
-    let mut image: Vec<Node> = Vec::with_capacity(graph.len());
-    for (node, expr) in graph.nodes() {
-        let new = match expr {
-            Expr::Uniform(k) => Expr::Constant(values[k as usize].to_bits()),
-            _ => expr.map(|operand| image[operand.index()]),
-        };
-        image.push(now.intern(new, graph.span(node)));
-    }
-    (now, image[outputs[0].index()])
 }
 
 /// Where a junction is positive and where it is negative.

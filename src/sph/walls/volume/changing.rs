@@ -1,4 +1,5 @@
-//! The maps of a body that changes its shape: one at each of some instants, and a cubic in time between them.
+//! The maps of a body that changes its shape: one at each of some instants, and a cubic in time between them. A body that
+//! switches has one for each of its shapes.
 
 use std::sync::Arc;
 
@@ -24,6 +25,8 @@ pub struct ChangingShape {
     /// Equal intervals of the run, at least three, between which the body is looked at. Its surface should
     /// move by at most an eighth of the support radius in any of them.
     pub intervals: u64,
+    /// Whether the body says when it is the same, as one does that is at rest but for some instants.
+    pub switches: bool,
 }
 
 impl ChangingShape {
@@ -48,7 +51,9 @@ pub(super) struct Changing {
     time: f64,
     /// The number of the first map: how many intervals after the time 0 it is.
     first: u64,
-    maps: Vec<VolumeMap>,
+    maps: Vec<Arc<VolumeMap>>,
+    /// The maps of a body that switches, each with a time, s, at which it held. They are made once.
+    shapes: Vec<(f64, Arc<VolumeMap>)>,
     /// The weight of each map.
     weights: [f64; KEYS],
     /// Their derivatives, 1/s.
@@ -69,11 +74,12 @@ impl Changing {
             time: f64::NAN,
             first: 0,
             maps: Vec::new(),
+            shapes: Vec::new(),
             weights: [0.0; KEYS],
             rates: [0.0; KEYS],
         };
         changing.move_to(time);
-        (changing.maps.len() == KEYS).then_some(changing)
+        (changing.maps.len() == if shape.switches { 1 } else { KEYS }).then_some(changing)
     }
 
     /// Makes the maps around a time, s. They depend on the time alone, so a resumed run with the same end
@@ -82,7 +88,10 @@ impl Changing {
         if time == self.time {
             return;
         }
-        self.time = time;
+        let before = std::mem::replace(&mut self.time, time);
+        if self.shape.switches {
+            return self.switch(before);
+        }
         let interval = self.shape.interval();
         // a formula need not hold for times before the start and after the end
         let mut first = ((time / interval) as u64).saturating_sub(1);
@@ -95,13 +104,40 @@ impl Changing {
         self.first = first;
         while self.maps.len() < KEYS {
             let at = self.shape.instant(first + self.maps.len() as u64);
-            let body = self.shape.body.during(at, at);
-            let Some(map) = VolumeMap::on(&self.lattice, &self.stencil, vec![body.into()]) else { return };
+            let Some(map) = self.map(at) else { return };
             self.maps.push(map);
         }
         let x = time / interval - first as f64;
         self.weights = cubic(x);
         self.rates = cubic_slopes(x).map(|slope| slope / interval);
+        if let Some(present) = Spline::new(&self.lattice) {
+            self.present = present;
+        }
+    }
+
+    /// The map of the body at an instant, s; `None` if it has too many cells.
+    fn map(&self, at: f64) -> Option<Arc<VolumeMap>> {
+        let body = self.shape.body.during(at, at);
+        Some(Arc::new(VolumeMap::on(&self.lattice, &self.stencil, vec![body.into()])?))
+    }
+
+    /// Takes the map of the shape that the body has now, and had not at the time `before`, s. What is there at once does not
+    /// come with a velocity.
+    fn switch(&mut self, before: f64) {
+        let is_same = |at: f64| self.shape.body.is_same(at, self.time);
+        if !self.maps.is_empty() && is_same(before) {
+            return;
+        }
+        let map = match self.shapes.iter().find(|(at, _)| is_same(*at)) {
+            Some((_, map)) => map.clone(),
+            None => {
+                let Some(map) = self.map(self.time) else { return };
+                self.shapes.push((self.time, map.clone()));
+                map
+            }
+        };
+        self.maps = vec![map];
+        (self.weights, self.rates) = ([1.0, 0.0, 0.0, 0.0], [0.0; KEYS]);
         if let Some(present) = Spline::new(&self.lattice) {
             self.present = present;
         }
@@ -119,7 +155,9 @@ impl Changing {
     }
 
     pub fn bytes(&self) -> usize {
-        self.maps.iter().map(VolumeMap::bytes).sum()
+        let shapes = self.shapes.iter().map(|(_, map)| map);
+        let maps = self.maps.iter().filter(|_| !self.shape.switches);
+        maps.chain(shapes).map(|map| map.bytes()).sum()
     }
 }
 

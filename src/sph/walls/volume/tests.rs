@@ -234,7 +234,7 @@ fn parts_of_a_body_take_their_maps_along() {
 fn bodies_that_change_their_shape_take_what_they_would_at_each_instant() {
     let program = crate::Program::from_source("grows.rfm", "rfm 1\nsolid s = sphere(0.3 + 0.2*sin(t))");
     let solid = program.unwrap().solid("s").unwrap();
-    let shape = ChangingShape { body: Arc::new(solid.clone()), until: 1.4, intervals: 9 };
+    let shape = ChangingShape { body: Arc::new(solid.clone()), until: 1.4, intervals: 9, switches: false };
     let domain = cube(2.0);
     for time in [0.0, 0.07, 0.61, 1.23, 1.4, 1.52] {
         let changing = Changing::new(&shape, &domain, H, time).unwrap();
