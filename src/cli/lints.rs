@@ -177,7 +177,7 @@ impl<'a> Subject<'a> {
     fn seam(&self, at: DVec3) -> Diagnostic {
         let message = format!("ω of solid `{}` is 0 within it, at {}", self.name, point(at));
         self.warning(Code::SEAM, self.text, message, "there is a surface without an outside".into())
-            .help("if an outline is turned there, draw it beyond its axis: to x < 0 for `.revolve()`")
+            .help("let the parts that only touch there overlap; an outline that is turned is drawn beyond its axis, to x < 0 for `.revolve()`")
     }
 
     fn jump(&self, jump: &Break) -> Diagnostic {

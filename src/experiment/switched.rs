@@ -10,7 +10,6 @@ use crate::Engine;
 use crate::Solid;
 use crate::field::{Moving, Walls};
 use crate::geom::Placement;
-use crate::interval::Interval;
 use crate::ir::{Binary, Expr, Graph, Node, Outside, Uniforms, at_instant, hoisted};
 
 /// The most shapes that are compiled for one solid.
@@ -21,9 +20,6 @@ const STRETCHES: u32 = 512;
 
 /// The most of them in which it may switch: in all others it must be at rest.
 const MOST_SWITCHES: usize = 32;
-
-/// A range that is wider than this, or than this part of its numbers, is that of a change.
-const ROUNDED: f64 = 1e-14;
 
 /// A solid that is at rest but for switches.
 pub(super) struct Switched {
@@ -43,7 +39,7 @@ impl Switched {
         let at = |k: u32| until * f64::from(k) / f64::from(STRETCHES);
         let (mut switches, mut shapes) = (0, Vec::new());
         for k in 0..STRETCHES {
-            match still(&numbers, at(k), at(k + 1)) {
+            match numbers.at_rest(at(k), at(k + 1)) {
                 Some(key) if shapes.contains(&key) => (),
                 Some(key) => shapes.push(key),
                 None => switches += 1,
@@ -58,7 +54,7 @@ impl Switched {
 
     /// The solid as one at rest; `None` if it switches between two times, s, or has had too many shapes.
     fn at_rest(&self, from: f64, to: f64) -> Option<Solid> {
-        let key = still(&self.numbers, from, to)?;
+        let key = self.numbers.at_rest(from, to)?;
         let mut shapes = self.shapes.lock().unwrap_or_else(PoisonError::into_inner);
         if let Some((_, solid)) = shapes.iter().find(|(known, _)| *known == key) {
             return Some(solid.clone());
@@ -73,16 +69,6 @@ impl Switched {
         shapes.push((key, solid.clone()));
         Some(solid)
     }
-}
-
-/// The bits of numbers that stay what they are between two times, s; `None` if any changes.
-fn still(numbers: &Uniforms, from: f64, to: f64) -> Option<Vec<u64>> {
-    let bits = |time: f64| numbers.at(time, &[]).into_iter().map(f64::to_bits).collect::<Vec<_>>();
-    let now = bits(to);
-    // what is proven between is rounded outwards
-    let is_still = |range: Interval| range.hi - range.lo <= ROUNDED * (1.0 + range.lo.abs());
-    let stays = || numbers.over(Interval::new(from.min(to), from.max(to)), &[]).into_iter().all(is_still);
-    (from == to || (bits(from) == now && stays())).then_some(now)
 }
 
 /// A formula with what is chosen in place of choices a·1 + b·0. (As sums they are doubtful: each of their contacts was
@@ -117,7 +103,7 @@ impl Moving for Switched {
     }
 
     fn is_same(&self, a: f64, b: f64) -> bool {
-        let key = |time: f64| still(&self.numbers, time, time);
+        let key = |time: f64| self.numbers.at_rest(time, time);
         key(a).is_some_and(|now| key(b) == Some(now))
     }
 }

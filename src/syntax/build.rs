@@ -98,8 +98,8 @@ struct Builder {
 impl Builder {
     fn span(&self, pair: &Node<'_>) -> Span {
         let span = pair.as_span();
-        // rules end behind trailing white space, which a message should not underline
-        let length = pair.as_str().trim_end().len();
+        // rules end behind trailing white space and comments, which a message should not underline
+        let length = length_of_code(pair.as_str());
         Span::new(self.source, self.offset + span.start(), self.offset + span.start() + length)
     }
 
@@ -493,4 +493,49 @@ fn text_of(pair: Node<'_>) -> String {
 /// Reads a number. The grammar admits only what `f64` reads, except for a pasted minus sign in the exponent.
 fn number(text: &str) -> f64 {
     text.replace('−', "-").parse().unwrap_or(f64::NAN)
+}
+
+/// The length of a text without the white space and the comments at its end.
+fn length_of_code(text: &str) -> usize {
+    if !text.contains('#') && !text.contains("//") {
+        return text.trim_end().len();
+    }
+    let (mut end, mut is_quoted) = (0, false);
+    let mut rest = text;
+    while let Some(c) = rest.chars().next() {
+        let at = text.len() - rest.len();
+        if !is_quoted && (c == '#' || rest.starts_with("//")) {
+            let line = rest.find('\n').unwrap_or(rest.len());
+            rest = &rest[line..];
+            continue;
+        }
+        // a text ends with its line
+        is_quoted = c != '\n' && (is_quoted != (c == '"'));
+        rest = &rest[c.len_utf8()..];
+        if !c.is_whitespace() {
+            end = at + c.len_utf8();
+        }
+    }
+    end
+}
+
+#[cfg(test)]
+mod tests {
+    use super::length_of_code;
+
+    #[test]
+    fn what_stands_behind_the_code_is_not_its_end() {
+        for (text, code) in [
+            ("a + b", "a + b"),
+            ("a  \n\t", "a"),
+            ("a # one\n  // two\n# three", "a"),
+            ("a # one\n + b // two\n", "a # one\n + b"),
+            ("mesh(\"a#b//c.stl\") # d \"e\"", "mesh(\"a#b//c.stl\")"),
+            ("x² # é", "x²"),
+            ("# nothing", ""),
+            ("", ""),
+        ] {
+            assert_eq!(&text[..length_of_code(text)], code, "{text:?}");
+        }
+    }
 }

@@ -81,6 +81,21 @@ impl Uniforms {
     }
 }
 
+/// A range that is wider than this, or than this part of its numbers, is that of a change.
+const ROUNDED: f64 = 1e-14;
+
+impl Uniforms {
+    /// The bits of their values if they stay the same between two times, s; `None` if any is not known to.
+    pub fn at_rest(&self, from: f64, to: f64) -> Option<Vec<u64>> {
+        let bits = |time: f64| self.at(time, &[]).into_iter().map(f64::to_bits).collect::<Vec<_>>();
+        let now = bits(to);
+        // what is proven between is rounded outwards
+        let is_still = |range: Interval| range.hi - range.lo <= ROUNDED * (1.0 + range.lo.abs());
+        let stay = || self.over(Interval::new(from.min(to), from.max(to)), &[]).into_iter().all(is_still);
+        (from == to || (bits(from) == now && stay())).then_some(now)
+    }
+}
+
 /// What does not differ from point to point.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Outside {

@@ -56,8 +56,11 @@ impl OfWalls {
             for k in 0..density.len() {
                 if density[k] < least {
                     let by_motion = 0.5 * dt * (rate_before[k] + rate[k]);
-                    let taken = (part_before[k] + by_motion - part[k]).max(0.0);
-                    density[k] = least.min(density[k] + taken);
+                    let taken = part_before[k] + by_motion - part[k];
+                    // a wall that stops or moves a particle on its way takes nothing
+                    if taken > dt * (rate_before[k].abs() + rate[k].abs()) {
+                        density[k] = least.min(density[k] + taken);
+                    }
                 }
             }
         });

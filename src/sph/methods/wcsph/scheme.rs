@@ -386,7 +386,7 @@ impl Weakly {
         if dt > 0.0 {
             self.correct_densities(core, &places, &drift, dt);
         }
-        if dt > 0.0 && closes_gaps(&self.numbers) {
+        if dt > 0.0 && core.boundary.any_moves() && closes_gaps(&self.numbers) {
             self.of_walls.lift(&core.parameters, &mut core.particles.density, dt);
         }
         self.of_walls.advance();
