@@ -21,6 +21,9 @@ const STRETCHES: u32 = 512;
 /// The most of them in which it may switch: in all others it must be at rest.
 const MOST_SWITCHES: usize = 32;
 
+/// Instants of a stretch with a switch at which the shape is looked at.
+const SAMPLES: u32 = 32;
+
 /// A solid that is at rest but for switches.
 pub(super) struct Switched {
     whole: Solid,
@@ -39,10 +42,20 @@ impl Switched {
         let at = |k: u32| until * f64::from(k) / f64::from(STRETCHES);
         let (mut switches, mut shapes) = (0, Vec::new());
         for k in 0..STRETCHES {
-            match numbers.at_rest(at(k), at(k + 1)) {
-                Some(key) if shapes.contains(&key) => (),
-                Some(key) => shapes.push(key),
-                None => switches += 1,
+            let (from, to) = (at(k), at(k + 1));
+            let found = match numbers.at_rest(from, to) {
+                Some(key) => vec![key],
+                None => {
+                    switches += 1;
+                    // what passes from one shape to another has more of them on its way
+                    let within = |i: u32| from + (to - from) * f64::from(i) / f64::from(SAMPLES);
+                    (0..=SAMPLES).filter_map(|i| numbers.at_rest(within(i), within(i))).collect()
+                }
+            };
+            for key in found {
+                if !shapes.contains(&key) {
+                    shapes.push(key);
+                }
             }
             if switches > MOST_SWITCHES || shapes.len() > MOST_SHAPES {
                 return None;
@@ -149,6 +162,8 @@ mod tests {
             "ball([0, 0, 0], 1 + 0.1*sin(t))",
             "ball([floor(40*t), 0, 0], 1)",
             "ball([max(t - 1, 0), 0, 0], 1)",
+            // at rest but for a twentieth of a second
+            "ball([0, 0, 0], 1 + clamp(10*t, 0, 0.5))",
         ] {
             assert!(switched(solid).is_none(), "{solid}");
         }

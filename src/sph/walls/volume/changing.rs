@@ -15,6 +15,9 @@ use crate::{field::Moving, geom::Aabb};
 /// Maps that are known at a time.
 const KEYS: usize = 4;
 
+/// The most maps that are kept of a body that switches.
+const MOST_SHAPES: usize = 8;
+
 /// A body that changes its shape, and how often it is looked at.
 #[derive(Clone)]
 pub struct ChangingShape {
@@ -132,7 +135,9 @@ impl Changing {
             Some((_, map)) => map.clone(),
             None => {
                 let Some(map) = self.map(self.time) else { return };
-                self.shapes.push((self.time, map.clone()));
+                if self.shapes.len() < MOST_SHAPES {
+                    self.shapes.push((self.time, map.clone()));
+                }
                 map
             }
         };
