@@ -47,6 +47,13 @@ fn unreadable(path: &Path, error: &Error) -> Failure {
 
 /// The failure for a path at which there is neither a file nor a folder.
 pub(super) fn missing(path: &Path) -> Failure {
+    // as `rfm explain` takes them
+    let shown = path.shown();
+    if let Some((file, name)) = shown.rsplit_once(':').filter(|(file, _)| Path::new(file).is_file()) {
+        let hint =
+            format!("a solid of `{file}` is chosen by `--solid {name}`, and a scene by `--scene {name}`");
+        return Failure::usage(format!("there is no file `{shown}`; {hint}"));
+    }
     let with_ending =
         Some(path.with_extension("rfm")).filter(|other| path.extension().is_none() && other.is_file());
     let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty());

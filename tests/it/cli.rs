@@ -120,6 +120,14 @@ fn other_files_are_checked_beside_one_that_is_missing() {
     }
 }
 
+/// `rfm explain` takes the name of a solid behind that of its file, and other commands by a flag.
+#[test]
+fn a_name_behind_that_of_a_file_leads_to_its_flag() {
+    let outcome = rfm(root(), &["check", &format!("{PAWN}:pawn")]).expect(2);
+    let hint = format!("a solid of `{PAWN}` is chosen by `--solid pawn`, and a scene by `--scene pawn`");
+    assert!(outcome.stderr.contains(&hint), "{}", outcome.stderr);
+}
+
 /// Each file to begin with passes its check, and the one with a known outcome is near it.
 #[test]
 fn a_new_user_begins_with_a_file_that_works() {
