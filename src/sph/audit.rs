@@ -197,6 +197,8 @@ impl Sums {
         let (method, scales) = (core.parameters.method.numerics(), core.parameters.scales());
         let is_staggered = method.is_staggered();
         let limit = greatest_speed(&core.parameters).map_or(f64::INFINITY, |speed| speed.powi(2));
+        // what all of the fluid does compresses nothing
+        let of_all = if limit.is_finite() { core.particles.velocity.mean() } else { DVec3::ZERO };
         let position = core.particles.position.components().map(|c| c.par_chunks(CHUNK));
         let velocity = core.particles.velocity.components().map(|c| c.par_chunks(CHUNK));
         let [x, y, z] = position;
@@ -213,7 +215,8 @@ impl Sums {
                     let square = u[k] * u[k] + v[k] * v[k] + w[k] * w[k];
                     sums.squares += square;
                     sums.fastest = sums.fastest.max(square);
-                    sums.too_fast += usize::from(square > limit);
+                    let relative = (DVec3::new(u[k], v[k], w[k]) - of_all).length_squared();
+                    sums.too_fast += usize::from(relative > limit);
                     sums.places += DVec3::new(x[k], y[k], z[k]);
                 }
                 sums.elastic = method.elastic_energies(&scales, density);

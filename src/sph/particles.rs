@@ -40,6 +40,11 @@ impl Vectors {
         DVec3::new(self.x[i], self.y[i], self.z[i])
     }
 
+    /// Their mean; zero if there are none.
+    pub fn mean(&self) -> DVec3 {
+        self.iter().sum::<DVec3>() / self.len().max(1) as f64
+    }
+
     /// Replaces vector `i`.
     ///
     /// # Panics

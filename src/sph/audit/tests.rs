@@ -105,6 +105,23 @@ fn a_fluid_as_fast_as_a_gas_is_told_of() {
     assert!(told.is_some_and(|text| text.ends_with("; leave `sound_speed` out")), "{found:?}");
 }
 
+#[test]
+fn what_flies_as_one_is_no_gas() {
+    let parameters = Parameters { gravity: DVec3::ZERO, ..parameters(Wcsph::default().into(), 0.1) };
+    let flying = |stirred: f64| {
+        let mut simulation = crate::sph::scenes::free(
+            parameters.clone(),
+            &std::array::from_fn::<_, 8, _>(|k| {
+                let at = 0.1 * DVec3::new((k % 2) as f64, (k / 2 % 2) as f64, (k / 4) as f64);
+                (at, DVec3::new(2.0 * parameters.sound_speed(), stirred * (k % 2) as f64, 0.0))
+            }),
+        );
+        simulation.step_at_most(1e-5).unwrap();
+        simulation.findings().iter().any(|(finding, _)| *finding == Finding::Speed)
+    };
+    assert!(!flying(0.0) && flying(2.0 * parameters.sound_speed()));
+}
+
 /// A cube of 0.4 m without gravity that is pressed flat along x at this rate, 1/s, and grows at half of it along y and z.
 fn pressed_flat(method: Method, rate: f64) -> Simulation {
     let spacing = 0.05;

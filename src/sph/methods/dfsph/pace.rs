@@ -29,7 +29,7 @@ impl Pace {
     pub fn at_start(core: &Core) -> Self {
         let velocity = &core.particles.velocity;
         let fastest = greatest(velocity, DVec3::ZERO);
-        let found = greatest(velocity, mean(velocity));
+        let found = greatest(velocity, velocity.mean());
         // rounding leaves nothing of equal squares
         let by_others = (core.parameters.expected_speed.powi(2) - fastest.powi(2)).max(0.0);
         Self { expected: (by_others + found.powi(2)).sqrt(), found }
@@ -38,7 +38,7 @@ impl Pace {
     /// Looks at the velocities of a step. Returns the speed by which motion is damped, m/s.
     pub fn follow(&mut self, core: &Core) -> f64 {
         let velocity = &core.particles.velocity;
-        self.found = self.found.max(greatest(velocity, mean(velocity)));
+        self.found = self.found.max(greatest(velocity, velocity.mean()));
         self.expected.max(self.found).min(core.parameters.expected_speed)
     }
 
@@ -63,8 +63,4 @@ impl Pace {
 /// The greatest speed, m/s, as seen from something with the velocity `from`.
 fn greatest(velocity: &Vectors, from: DVec3) -> f64 {
     velocity.iter().map(|v| (v - from).length_squared()).fold(0.0, f64::max).sqrt()
-}
-
-fn mean(velocity: &Vectors) -> DVec3 {
-    velocity.iter().sum::<DVec3>() / velocity.len().max(1) as f64
 }
