@@ -197,7 +197,8 @@ impl fmt::Display for StepError {
                 return write!(
                     f,
                     "step {step}: moving walls leave no room for particle {id} at {at}: they close on the fluid, or \
-                     pass over it in one step; end the motion earlier, leave a gap, or make `dt` shorter"
+                     pass over it in one step; end the motion earlier, leave a gap, make `dt` shorter, or let what appears \
+                     at once come in from outside, or grow"
                 );
             }
             Self::EnergyDoubled { step, excess, walls_move, id, speed } => {
