@@ -187,6 +187,7 @@ impl Declaration for Dfsph {
         "own pressure",
         "pressure ahead",
         "step ahead",
+        "velocity of the vessel",
         "stiffness",
         "last step",
         "closed bodies",

@@ -61,7 +61,7 @@ impl DivergenceFree {
     ) -> Option<Hydrostatic> {
         let bodies = bodies.filter(|_| core.parameters.is_sealed)?;
         let (times, share) = ((self.last_dt, dt), mean_share(core, dt, relaxation));
-        self.carried.learn(bodies.clone(), &self.forces.push, times, share);
+        self.carried.learn(bodies.clone(), (core, &self.walls, &self.forces.push), times, share);
         Some(Hydrostatic::of(core, bodies, |i| core.parameters.gravity - self.carried.of(i)))
     }
 
@@ -72,6 +72,7 @@ impl DivergenceFree {
         self.forces.note_walls(reaction, &self.walls, rest_density, (&self.forces.push, &self.forces.s));
         if let Some(hydrostatic) = hydrostatic {
             hydrostatic.note_walls(core, (&mut self.forces, &self.walls), reaction, gravity);
+            self.carried.note_work(core, dt);
         }
     }
 
