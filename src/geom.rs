@@ -140,6 +140,27 @@ impl Aabb {
         high.min[axis] = middle;
         [low, high]
     }
+
+    /// The two halves of the box. A huge one is cut by magnitude as seen from a point, so that the scale of what is in it
+    /// is found in a few steps.
+    pub fn halves_seen_from(&self, from: DVec3) -> [Self; 2] {
+        const HUGE: f64 = 1e6;
+        if self.size().max_element() < HUGE {
+            return self.halves();
+        }
+        let scale = |x: f64| x.signum() * x.abs().ln_1p();
+        let ends = |axis: usize| [self.min[axis], self.max[axis]].map(|x| scale(x - from[axis]));
+        let lengths = DVec3::from_array(std::array::from_fn(|axis| ends(axis)[1] - ends(axis)[0]));
+        let axis = lengths.max_position();
+        let middle = 0.5 * (ends(axis)[0] + ends(axis)[1]);
+        let cut = from[axis] + middle.signum() * middle.abs().exp_m1();
+        // not `clamp`, which panics where the ends of a side are not in order
+        let cut = cut.max(self.min[axis]).min(self.max[axis]);
+        let (mut low, mut high) = (*self, *self);
+        low.max[axis] = cut;
+        high.min[axis] = cut;
+        [low, high]
+    }
 }
 
 /// Where a body is that has been turned about the origin and then moved.

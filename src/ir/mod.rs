@@ -45,8 +45,8 @@ pub(crate) use bounds::range::{
     Affine, Limits, RangeRule, Region, SQUARES_OVERFLOW, SQUARES_UNDERFLOW, WEIGHT_ROUNDING,
 };
 pub(crate) use contraction::{
-    Contracted, Contractor, Far, LinearForm, SURFACE_ROUNDING, Scales, Wanted, contract_linear,
-    contract_linear_around, is_nowhere_positive, reach,
+    Contracted, Contractor, LinearForm, SURFACE_ROUNDING, Wanted, close_reach, contract_linear,
+    contract_linear_around, cube_around, is_nowhere_positive, reach,
 };
 pub(crate) use derived::contact::{contact, wall_velocity};
 pub(crate) use derived::forward::forward_gradient;

@@ -106,12 +106,17 @@ impl Lowering<'_> {
     /// Whether a formula is a polynomial of the coordinates. What holds of it at places in general position then holds
     /// everywhere.
     fn is_polynomial(&self, formula: Node) -> bool {
-        let graph = &self.module.graph;
+        Self::is_of_sums(&self.module.graph, formula, false)
+    }
+
+    /// Whether a formula is made of sums, products and quotients by numbers, and perhaps of roots.
+    fn is_of_sums(graph: &Graph, formula: Node, with_roots: bool) -> bool {
         let varies = |node: Node| Axis::SPACE.iter().any(|&axis| graph.uses(node, axis));
         graph.cone(formula).into_iter().filter(|&node| varies(node)).all(|node| match graph.expr(node) {
             Expr::Coordinate(_)
             | Expr::Unary(Unary::Neg, _)
             | Expr::Binary(Binary::Add | Binary::Sub | Binary::Mul, ..) => true,
+            Expr::Unary(Unary::Sqrt, _) => with_roots,
             Expr::Binary(Binary::Div, _, divisor) => !varies(divisor),
             Expr::Unary(..)
             | Expr::Binary(..)
@@ -162,22 +167,13 @@ impl Lowering<'_> {
             let point = std::array::from_fn(|axis| middle[axis] + half * spread(i, axis));
             found.extend(slopes.at(point, 7.0 * spread(i, 3), parameters));
         }
-        if found.len() < FEWEST_PLACES {
-            return Profile::Other;
+        match Slope::profile(&found) {
+            // the first place is the middle, which may be the axis of a cone, where the slope is that of no side
+            Profile::Other if Self::is_of_sums(&graph, leaf, true) => {
+                Slope::profile(found.get(1..).unwrap_or_default())
+            }
+            known => known,
         }
-        let first = found[0];
-        if found.iter().all(|at| (at.slope - first.slope).abs() <= ROUNDING * first.slope) {
-            return Profile::Linear(first.slope);
-        }
-        let is_same = |at: &Slope| (at.square - first.square).abs() <= ROUNDING * (at.terms + first.terms);
-        if first.square > 0.0 && found.iter().all(is_same) {
-            // the one with the least rounding
-            let best = found.iter().min_by(|a, b| a.terms.total_cmp(&b.terms)).unwrap_or(&first);
-            let has_same = |at: &Slope| (at.second - best.second).abs() <= 1e-8 * best.second.abs();
-            let second = found.iter().all(has_same).then_some(best.second);
-            return Profile::Quadratic { at_surface: best.square.sqrt(), second };
-        }
-        Profile::Other
     }
 }
 
@@ -188,6 +184,28 @@ struct Slope {
     second: f64,
     square: f64,
     terms: f64,
+}
+
+impl Slope {
+    /// What all places have in common.
+    fn profile(found: &[Self]) -> Profile {
+        let [first, ..] = found else { return Profile::Other };
+        if found.len() < FEWEST_PLACES {
+            return Profile::Other;
+        }
+        if found.iter().all(|at| (at.slope - first.slope).abs() <= ROUNDING * first.slope) {
+            return Profile::Linear(first.slope);
+        }
+        let is_same = |at: &Self| (at.square - first.square).abs() <= ROUNDING * (at.terms + first.terms);
+        if first.square > 0.0 && found.iter().all(is_same) {
+            // the one with the least rounding
+            let best = found.iter().min_by(|a, b| a.terms.total_cmp(&b.terms)).unwrap_or(first);
+            let has_same = |at: &Self| (at.second - best.second).abs() <= 1e-8 * best.second.abs();
+            let second = found.iter().all(has_same).then_some(best.second);
+            return Profile::Quadratic { at_surface: best.square.sqrt(), second };
+        }
+        Profile::Other
+    }
 }
 
 /// The program for [`Slope`].

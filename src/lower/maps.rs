@@ -23,7 +23,7 @@ impl Lowering<'_> {
         let u = self.binary(Binary::Add, xc, ys, span);
         let v = self.binary(Binary::Sub, yc, xs, span);
         let turned = self.module.graph.substitute(shape, [u, v, z]);
-        let Some(bounds) = ir::reach(&self.module.graph, shape) else { return turned };
+        let Some(bounds) = ir::close_reach(&self.module.graph, shape) else { return turned };
         let radius = bounds.min.abs().max(bounds.max.abs()).truncate().length();
         self.least_with_round(turned, [x, y], [0.0; 2], radius, span)
     }

@@ -12,7 +12,7 @@ use glam::DVec3;
 
 use super::bounds::contraction::Tree;
 use super::bounds::queue::Queued;
-use super::bounds::search::{Effort, NODES_PER_WORK, SEARCH_RADIUS, Shrink, halves};
+use super::bounds::search::{Effort, NODES_PER_WORK, SEARCH_RADIUS, Shrink};
 use super::bounds::whole::WholeFormula;
 use super::construction::Solid;
 use super::leaves::words;
@@ -236,7 +236,7 @@ impl Distances {
             if best.distance < before * (1.0 - GAP) {
                 best.turn();
             }
-            for mut half in halves(&space, p) {
+            for mut half in space.halves_seen_from(p) {
                 let Some((known, beyond)) = target.shrink_from(&known, &mut half, p) else { continue };
                 let distance = distance_to(&half, p).max(beyond);
                 if distance < best.distance {
@@ -263,7 +263,7 @@ impl Distances {
                 }
                 continue;
             }
-            for mut half in halves(&space, DVec3::ZERO) {
+            for mut half in space.halves_seen_from(DVec3::ZERO) {
                 if let Some(known) = target.shrink(&known, &mut half, Effort::Cell) {
                     queue.push(queued((half, known)));
                 }

@@ -51,6 +51,9 @@ fn rounded_and_offset_shapes_end_where_their_parts_do() {
     check("box([0,0,0],[9,3,0.4]).offset(0.2)", [-0.2; 3], [9.2, 3.2, 0.6], 1e-6);
     check("box([0,0,0],[9,3,0.4]).offset(-0.1)", [0.1; 3], [8.9, 2.9, 0.3], 1e-6);
     check("(sphere(1) or box([0,0,0],[2,2,2])).offset(0.5)", [-1.5; 3], [2.5; 3], 1e-5);
+    // on its axis the field of a cone has no slope
+    let (wide, high) = (1.0 + 0.2 * (1.0 + 2_f64.sqrt()), 1.0 + 0.2 * 2_f64.sqrt());
+    check("cone(1,1).offset(0.2)", [-wide, -wide, -0.2], [wide, wide, high], 1e-5);
 }
 
 /// A chamfer that is rounded ends where it did, and by the radius less at its edges.

@@ -180,3 +180,13 @@ fn a_bent_plate_that_turns_has_ends_at_all_times() {
         assert!(found.size().max_element() < 5.2, "{time}: {found:?}");
     }
 }
+
+/// What turns from height to height has a limit that follows from the shape, and products of coordinates, whose ends are
+/// found by powers or from near, have one, too.
+#[test]
+fn twisted_polynomials_have_bounds_near_their_points() {
+    check_by_samples("solid s = (x^2 + y^2 + z^2 - x*y <= 0.1).twist(0.1)", 0.02);
+    check_by_samples("solid s = (x^4 + y^4 + z^4 - x*y*z <= 0.1).twist(0.1)", 0.2);
+    check_by_samples("solid s = (x^4 - x^2 + y^2 + z^2 <= 0.1).rotate([1, 1, 1], 1).twist(0.1)", 0.2);
+    check_by_samples("solid s = (x^4 + y^4 + z^4 - x*y <= 0.1).rotate([1, 1, 1], 1).twist(0.1)", 0.2);
+}

@@ -82,6 +82,24 @@ fn operands_are_idle_by_all_of_the_formula() {
     }
 }
 
+/// What `.twist` and `.repeat` draw around a shape follows from all of it, and proves nothing of the shape without a part:
+/// here that one has points at any distance.
+#[test]
+fn an_operand_that_ends_a_shape_is_not_idle_by_the_limits_that_follow_from_it() {
+    let endless = "x^2 + y^2 + z^2 - x*y*z <= 0.1";
+    for (map, far) in [("twist(0.1)", [0.0, 8.0, 7.0]), ("repeat([6, 0, 0], [3, 1, 1])", [-4.0, -4.0, 4.0])] {
+        let text =
+            format!("rfm 1\nsolid s = ({endless} and sphere(2)).{map}\nsolid without = ({endless}).{map}");
+        let program = Program::from_source("t.rfm", text).unwrap_or_else(|e| panic!("{e}"));
+        let source = program.module().solids[0].span.source;
+        let [solid, without] = ["s", "without"].map(|name| program.solid(name).unwrap());
+        let far = DVec3::from_array(far);
+        assert!(solid.sign(far) < 0.0 && without.sign(far) > 0.0, "{map}");
+        assert_eq!(solid.idle_operands(source, &mut { usize::MAX }).spans, [], "{map}");
+    }
+    assert_eq!(idle("(box([0, 0, 0], [1, 1, 1]) and sphere(2)).repeat([3, 0, 0], [3, 1, 1])"), ["sphere(2)"]);
+}
+
 /// |∇ω| of k·(r² − x² − y²) at the surface is 2kr, that of a half-space 1.
 #[test]
 fn gradients_are_compared_at_the_surface() {
@@ -482,10 +500,10 @@ fn only_lofts_of_solids_are_asked_about() {
     }
 }
 
-/// What is left of a cone is a point up to rounding, which no grid divides. The other solids of the file are measured.
+/// A ball smaller than the digits of its place is divided by no grid. The other solids of the file are measured.
 #[test]
 fn a_solid_that_is_next_to_nothing_does_not_hide_the_others() {
-    let text = b"rfm 1\nsolid s = cone(0.5, 1).offset(-0.5)\nsolid d = sphere(1)\n";
+    let text = b"rfm 1\nsolid s = ball([0, 0, 0.5], 1e-16)\nsolid d = sphere(1)\n";
     let said = rfm_reading(root(), &["check", "-"], text).expect(0).stdout;
     assert!(said.contains("volume      not found: the room around [0, 0, 0.5] cannot be divided"), "{said}");
     assert!(said.contains("volume      4.18879"), "{said}");

@@ -9,6 +9,9 @@
 //! | `contractor` | both, over all nodes of a graph |
 //! | `forms` | the linear forms in a graph |
 //! | `growth`, `far` | formulas far from the origin, by the powers with which they grow |
+//! | `cube` | a cube beyond which a formula is positive nowhere |
+//! | `closer` | a box made smaller by subdivision from each side |
+//! | `reach` | a box around the points at which a formula is positive, for what is made of that formula |
 //! | `hull` | a box made smaller by values (hull consistency) |
 //! | `slopes` | a box made smaller by derivatives (the mean value form) |
 //! | `linear` | linear forms with known ranges, and the box around them (linear programming) |
@@ -23,7 +26,9 @@
 //! operation.
 
 mod backward;
+mod closer;
 mod contractor;
+mod cube;
 mod far;
 mod forms;
 mod forward;
@@ -37,9 +42,8 @@ mod sets;
 mod slopes;
 
 pub use contractor::{Contractor, Wanted};
-pub use far::Far;
-pub use growth::Scales;
+pub use cube::cube_around;
 pub use linear::{LinearForm, contract_linear, contract_linear_around};
-pub use reach::{is_nowhere_positive, reach};
+pub use reach::{close_reach, is_nowhere_positive, reach};
 pub use sets::Contracted;
 pub use slopes::SURFACE_ROUNDING;

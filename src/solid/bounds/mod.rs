@@ -7,7 +7,7 @@
 //! | `whole` | the same for solids that are too large to be taken apart |
 //! | `search` | contraction first, then subdivision from each side |
 //! | `queue` | boxes that wait for it |
-//! | `far` | a cube beyond which a formula is proven to be positive nowhere |
+//! | `far` | a cube that holds a solid whose bounds were not found from near |
 //! | `operands` | a box from those of the operands, each in coordinates of its own |
 //! | `find`, `found` | the bounds of a solid, and the sides to which no end was found |
 //! | `unbounded` | which operand has no box, and to which sides |

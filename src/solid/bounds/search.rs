@@ -201,7 +201,7 @@ impl<S: Shrink> Faces<'_, S> {
             }
             cells += 1;
             *work = work.saturating_sub(self.solid.work(&farthest.known));
-            for mut half in halves(&farthest.space, DVec3::ZERO) {
+            for mut half in farthest.space.halves_seen_from(DVec3::ZERO) {
                 if let Some(known) = self.solid.shrink(&farthest.known, &mut half, Effort::Cell) {
                     queue.push(Queued { rank: side.of(&half), space: half, known });
                 }
@@ -239,25 +239,4 @@ impl<S: Shrink> Faces<'_, S> {
         let inside = points.into_iter().flatten().find(is_inside);
         inside.map_or(f64::NEG_INFINITY, |p| self.side.of_point(p))
     }
-}
-
-/// The two halves of a cell. Huge ones are cut by magnitude as seen from a point, so that the scale of a solid is found
-/// in a few steps.
-pub fn halves(space: &Aabb, from: DVec3) -> [Aabb; 2] {
-    const HUGE: f64 = 1e6;
-    if space.size().max_element() < HUGE {
-        return space.halves();
-    }
-    let scale = |x: f64| x.signum() * x.abs().ln_1p();
-    let ends = |axis: usize| [space.min[axis], space.max[axis]].map(|x| scale(x - from[axis]));
-    let lengths = DVec3::from_array(std::array::from_fn(|axis| ends(axis)[1] - ends(axis)[0]));
-    let axis = lengths.max_position();
-    let middle = 0.5 * (ends(axis)[0] + ends(axis)[1]);
-    let cut = from[axis] + middle.signum() * middle.abs().exp_m1();
-    // not `clamp`, which panics where the ends of a side are not in order
-    let cut = cut.max(space.min[axis]).min(space.max[axis]);
-    let (mut low, mut high) = (*space, *space);
-    low.max[axis] = cut;
-    high.min[axis] = cut;
-    [low, high]
 }

@@ -9,7 +9,7 @@ use super::operands::{Operands, Sign};
 use crate::diagnostic::{SourceId, Span};
 use crate::geom::Aabb;
 use crate::interval::Interval;
-use crate::solid::bounds::search::{SEARCH_RADIUS, halves};
+use crate::solid::bounds::search::SEARCH_RADIUS;
 use crate::solid::construction::Solid;
 use crate::solid::leaves::leaf_set::Leaves;
 
@@ -173,7 +173,7 @@ impl<'a> Search<'a> {
             if space.size().max_element() < smallest || self.matters_at(space.centre(), operand, removed) {
                 return Proof::Open;
             }
-            open.extend(halves(&space, DVec3::ZERO));
+            open.extend(space.halves_seen_from(DVec3::ZERO));
         }
         Proof::Idle
     }

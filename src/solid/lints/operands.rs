@@ -34,6 +34,9 @@ pub struct Operand {
     pub joined: Option<(usize, usize)>,
     /// The positive factor by which the operand is multiplied before it is joined.
     pub factor: f64,
+    /// Whether it is a limit that the language has drawn around the other operand, as `.twist` does: it changes no point
+    /// of that shape, but perhaps of the shape that is left when a part of it is removed.
+    pub is_limit: bool,
 }
 
 /// The operands of a solid. Each comes before its own operands; the first is the whole solid.
@@ -103,7 +106,8 @@ impl Operands {
                 Kind::Any(..) => (Sign::Inside, Sign::Outside),
                 Kind::Leaf { .. } => continue, // leaves have no operands
             };
-            free[i] = free[parent] || signs[other] == decided;
+            // a limit follows from its shape, and says nothing of one that has a part less
+            free[i] = free[parent] || signs[other] == decided && !self.all[other].is_limit;
             found[i] = signs[i] != Sign::Unknown && (free[i] || signs[i] == neutral);
         }
         found
@@ -181,7 +185,7 @@ impl Reader<'_> {
         let span = self.graph.span(root).filter(|span| !whole(span)).or(own);
         let leaf = self.leaves.get(&node).copied().unwrap_or(0);
         self.joins.push(own);
-        self.all.push(Operand { kind: Kind::Leaf { leaf, negated }, span, joined, factor });
+        self.all.push(Operand { kind: Kind::Leaf { leaf, negated }, span, joined, factor, is_limit: false });
         let (a, b, is_all) = match rule {
             SignRule::All(a, b) => (a, b, !negated),
             SignRule::Any(a, b) => (a, b, negated),
@@ -190,11 +194,26 @@ impl Reader<'_> {
         let first = self.read(a, Some((number, 0)), depth + 1)?;
         let second = self.read(b, Some((number, first)), depth + 1)?;
         self.all[first].joined = Some((number, second));
+        self.mark_limit(node, [(a, first), (b, second)]);
         if negated {
             self.complement(number + 1);
         }
         self.all[number].kind = if is_all { Kind::All(first, second) } else { Kind::Any(first, second) };
         Some(number)
+    }
+
+    /// Marks that of two operands of a node which is a limit around the other: the language joins it by the least, and has
+    /// it written where the node is, while the shape stands at a place of its own.
+    fn mark_limit(&mut self, node: Node, parts: [(Node, usize); 2]) {
+        if !matches!(self.graph.expr(node), Expr::Binary(Binary::Min, ..)) {
+            return;
+        }
+        let is_of_node = parts.map(|(part, _)| self.graph.span(part) == self.graph.span(node));
+        if let Some(limit) = parts.into_iter().zip(is_of_node).find_map(|((_, at), own)| own.then_some(at))
+            && is_of_node != [true; 2]
+        {
+            self.all[limit].is_limit = true;
+        }
     }
 
     /// Negates all operands from a number on.
