@@ -412,7 +412,8 @@ wall at the same place is at rest. Let the box or the container reach beyond the
 wall there.";
 SLOW_SOUND = "W0520":
 "`sound_speed` is stated, and the fluid may become faster than a fifth of it; or in a run, more than one particle in a thousand was
-faster than 0.4 of the speed of sound, stated or derived, as where a piston presses water through a hole. A weakly compressible fluid changes its density
+faster than 0.4 of the speed of sound, stated or derived, as seen from the fluid as a whole: as where a piston presses water through a
+hole. A weakly compressible fluid changes its density
 by about the square of its speed over that of sound: 1 % at a tenth, 5 % at more than a fifth. Beyond, it is a gas, and what is
 found is not that of a liquid. Left out, the speed of sound is ten times the greatest expected speed u, or with surface tension σ
 ten times √(u² + σ/ρa), with the spacing a, or in a creeping flow 10√(10νu/a).";

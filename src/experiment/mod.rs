@@ -111,10 +111,12 @@ impl Experiment {
         let parts = bodies::compile(&program, &scene, engine)?;
         let by_walls = bodies::greatest_speed(&program, &scene, &parts);
         let stirs = by_walls.by_motion > 0.0 || parts.iter().any(|part| part.whole.moves());
-        let seen_speed = parameters::typical_speed(&program, &scene, &fluid, stirs).max(by_walls.by_motion);
+        let by_fall = parameters::speed_of_fall(&program, &scene, &fluid, stirs);
+        let seen_speed = by_fall.hypot(parameters::fastest(&program, &scene)).max(by_walls.by_motion);
         let typical_speed = seen_speed.max(by_walls.by_pressure);
+        let driven_speed = by_fall.max(by_walls.by_motion).max(by_walls.by_pressure);
         let mass = filling::mass_by_number(&scene, &fluid).unwrap_or(scene.fluid.mass);
-        let mut parameters = parameters::of_scene(&program, &scene, mass, typical_speed);
+        let mut parameters = parameters::of_scene(&program, &scene, mass, (typical_speed, driven_speed));
         let mut method = scene.method;
         let wholes = || parts.iter().map(|part| &part.whole);
         let has_surface = || free_surface::has_surface(&scene, &fluid, wholes(), parameters.spacing());

@@ -23,9 +23,8 @@ pub struct TimeStep {
 const MANY_INSTANTS: usize = 256;
 const SOME_INSTANTS: usize = 13;
 
-/// A speed that the fluid can reach by its velocity at the start and a fall, m/s. `stirs` says whether something moves
-/// that may lift it.
-pub(super) fn typical_speed(program: &Program, scene: &Scene, shape: &Solid, stirs: bool) -> f64 {
+/// The speed that the fluid can reach by a fall from rest, m/s. `stirs` says whether something moves that may lift it.
+pub(super) fn speed_of_fall(program: &Program, scene: &Scene, shape: &Solid, stirs: bool) -> f64 {
     let size = scene.domain.size();
     let along = |gravity: DVec3| gravity.length() * gravity.normalize_or_zero().abs().dot(size);
     let fall = match &scene.gravity {
@@ -36,12 +35,17 @@ pub(super) fn typical_speed(program: &Program, scene: &Scene, shape: &Solid, sti
         }
         Gravity::Field(nodes) => most_in_fluid(program, scene, nodes, |gravity| gravity.abs().dot(size)),
     };
-    let start = fastest(program, scene);
-    (start * start + 2.0 * fall).sqrt()
+    (2.0 * fall).sqrt()
 }
 
-/// All parameters except the time step, which is 1 s here. `mass` is that of a particle, kg.
-pub(super) fn of_scene(program: &Program, scene: &Scene, mass: f64, typical_speed: f64) -> Parameters {
+/// All parameters except the time step, which is 1 s here. `mass` is that of a particle, kg, and the speeds, m/s, are those
+/// of [`Parameters::expected_speed`] and [`Parameters::driven_speed`].
+pub(super) fn of_scene(
+    program: &Program,
+    scene: &Scene,
+    mass: f64,
+    (expected_speed, driven_speed): (f64, f64),
+) -> Parameters {
     let (fluid, method) = (&scene.fluid, scene.method.fluid());
     Parameters {
         rest_density: fluid.density,
@@ -58,7 +62,8 @@ pub(super) fn of_scene(program: &Program, scene: &Scene, mass: f64, typical_spee
         wall_friction: scene.walls.friction,
         time_step: 1.0,
         adaptive: method.adaptive && scene.run.dt.is_none(),
-        expected_speed: typical_speed,
+        expected_speed,
+        driven_speed,
         method: scene.method,
         slip: scene.slip,
         sticks: scene

@@ -12,17 +12,19 @@ use crate::field::{Moving, Walls};
 use crate::geom::Placement;
 use crate::ir::{Binary, Expr, Graph, Node, Outside, Uniforms, at_instant, hoisted};
 
-/// The most shapes that are compiled for one solid.
+/// The most shapes of one solid: each is compiled.
 const MOST_SHAPES: usize = 8;
 
-/// Stretches of a run in which a solid is looked at.
-const STRETCHES: u32 = 512;
-
-/// The most of them in which it may switch: in all others it must be at rest.
+/// The most switches: at all other times it must be at rest.
 const MOST_SWITCHES: usize = 32;
 
-/// Instants of a stretch with a switch at which the shape is looked at.
-const SAMPLES: u32 = 32;
+/// Stretches of a run in which a solid is looked at first. A shape that stays for less between two stretches may be passed
+/// over; a step that meets it takes the solid with its time.
+const STRETCHES: u32 = 512;
+
+/// A stretch in which a solid changes is halved so often until it is a switch: it is far shorter than any step then. What takes
+/// longer to change is no switch, however long the run is.
+const MOST_HALVINGS: u32 = 32;
 
 /// A solid that is at rest but for switches.
 pub(super) struct Switched {
@@ -30,8 +32,8 @@ pub(super) struct Switched {
     engine: Engine,
     /// The numbers of its formula that depend on time alone.
     numbers: Uniforms,
-    /// The shapes that were needed so far, each with those numbers' bits.
-    shapes: Mutex<Vec<(Vec<u64>, Solid)>>,
+    /// The shapes that were needed so far, each with those numbers' bits; `None` for one that cannot be compiled alone.
+    shapes: Mutex<Vec<(Vec<u64>, Option<Solid>)>>,
 }
 
 impl Switched {
@@ -40,22 +42,17 @@ impl Switched {
     pub fn of(graph: &Graph, shape: Node, whole: &Solid, until: f64, engine: Engine) -> Option<Arc<Self>> {
         let numbers = hoisted(graph, &[shape], Outside::Time).uniforms;
         let at = |k: u32| until * f64::from(k) / f64::from(STRETCHES);
+        let mut stretches: Vec<(f64, f64, u32)> = (0..STRETCHES).map(|k| (at(k), at(k + 1), 0)).collect();
         let (mut switches, mut shapes) = (0, Vec::new());
-        for k in 0..STRETCHES {
-            let (from, to) = (at(k), at(k + 1));
-            let found = match numbers.at_rest(from, to) {
-                Some(key) => vec![key],
-                None => {
-                    switches += 1;
-                    // what passes from one shape to another has more of them on its way
-                    let within = |i: u32| from + (to - from) * f64::from(i) / f64::from(SAMPLES);
-                    (0..=SAMPLES).filter_map(|i| numbers.at_rest(within(i), within(i))).collect()
+        while let Some((from, to, halvings)) = stretches.pop() {
+            match numbers.at_rest(from, to) {
+                Some(key) if shapes.contains(&key) => {}
+                Some(key) => shapes.push(key),
+                None if halvings < MOST_HALVINGS => {
+                    let middle = 0.5 * (from + to);
+                    stretches.extend([(from, middle, halvings + 1), (middle, to, halvings + 1)]);
                 }
-            };
-            for key in found {
-                if !shapes.contains(&key) {
-                    shapes.push(key);
-                }
+                None => switches += 1,
             }
             if switches > MOST_SWITCHES || shapes.len() > MOST_SHAPES {
                 return None;
@@ -70,7 +67,7 @@ impl Switched {
         let key = self.numbers.at_rest(from, to)?;
         let mut shapes = self.shapes.lock().unwrap_or_else(PoisonError::into_inner);
         if let Some((_, solid)) = shapes.iter().find(|(known, _)| *known == key) {
-            return Some(solid.clone());
+            return solid.clone();
         }
         if shapes.len() >= MOST_SHAPES {
             return None;
@@ -78,9 +75,9 @@ impl Switched {
         let (graph, root) = self.whole.formula();
         let (graph, root) = at_instant(graph, root, to);
         let (graph, root) = without_choices(&graph, root);
-        let solid = Solid::new(self.whole.name(), &graph, root, self.engine).ok()?;
+        let solid = Solid::new(self.whole.name(), &graph, root, self.engine).ok();
         shapes.push((key, solid.clone()));
-        Some(solid)
+        solid
     }
 }
 
@@ -97,7 +94,13 @@ fn without_choices(graph: &Graph, root: Node) -> (Graph, Node) {
             Expr::Binary(Binary::MulOrZero, _, b) if number(b) == Some(0.0) => Some(of(b)),
             Expr::Binary(Binary::Add, a, b) if number(b) == Some(0.0) => Some(of(a)),
             Expr::Binary(Binary::Add, a, b) if number(a) == Some(0.0) => Some(of(b)),
-            _ => None,
+            Expr::Binary(..)
+            | Expr::Unary(..)
+            | Expr::Constant(_)
+            | Expr::Coordinate(_)
+            | Expr::Parameter(_)
+            | Expr::Uniform(_)
+            | Expr::Lookup(..) => None,
         };
         let new = only.unwrap_or_else(|| chosen.intern(expr.map(of), graph.span(node)));
         image.push(new);
@@ -129,13 +132,17 @@ mod tests {
     use crate::Program;
 
     fn switched(solid: &str) -> Option<Arc<Switched>> {
+        switched_until(solid, 2.0)
+    }
+
+    fn switched_until(solid: &str, until: f64) -> Option<Arc<Switched>> {
         let program = Program::from_source("t.rfm", format!("rfm 1\nsolid s = {solid}")).unwrap();
         let whole = program.solid_with("s", Engine::Interpreter).unwrap();
         Switched::of(
             &program.module().graph,
             program.module().solids[0].node,
             &whole,
-            2.0,
+            until,
             Engine::Interpreter,
         )
     }
@@ -158,6 +165,13 @@ mod tests {
 
     #[test]
     fn what_moves_or_switches_all_the_time_is_not_at_rest() {
+        // a valve that closes within a stretch moves nevertheless, whether the run is short or long
+        let valve = "ball([clamp((t - 0.3)/0.04, 0, 1), 0, 0], 1)";
+        let gate = "if t < 0.3 then ball([0, 0, 0], 1) else ball([1, 0, 0], 1)";
+        for until in [0.5, 2.0, 200.0, 1e4] {
+            assert!(switched_until(valve, until).is_none(), "{until}");
+            assert!(switched_until(gate, until).is_some(), "{until}");
+        }
         for solid in [
             "ball([0, 0, 0], 1 + 0.1*sin(t))",
             "ball([floor(40*t), 0, 0], 1)",

@@ -11,7 +11,7 @@ use super::{
     shells::{Roots, shells},
 };
 use crate::field::Field;
-use crate::geom::directions;
+use crate::geom::{Aabb, directions};
 
 /// The findings about a mesh.
 #[derive(Debug, Clone, PartialEq)]
@@ -31,6 +31,8 @@ pub struct Report {
     pub solids: usize,
     /// The signed volume of each part in m³, in the order of their first vertices.
     pub component_volumes: Vec<f64>,
+    /// The box around each part, in the same order, m.
+    pub component_bounds: Vec<Aabb>,
     /// The Euler characteristic: vertices that triangles use − edges + triangles.
     pub euler: i64,
     /// The number of triangles with two vertices at one point.
@@ -66,6 +68,7 @@ pub fn check(mesh: &Mesh, field: &dyn Field) -> Report {
         components: shells.len(),
         solids: shells.iter().filter(|shell| shell.is_solid()).count(),
         component_volumes: shells.iter().map(|shell| shell.volume).collect(),
+        component_bounds: shells.iter().map(|shell| shell.bounds).collect(),
         euler: used as i64 - edges.count as i64 + mesh.triangles.len() as i64,
         degenerate: mesh.triangles.iter().filter(|t| coincide(t)).count(),
         volume: shells.iter().fold(0.0, |sum, shell| sum + shell.volume), // `sum` of an empty iterator is −0

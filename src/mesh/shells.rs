@@ -3,6 +3,7 @@
 //! Invariant: shells are listed in the order of their first vertices, and their triangles partition the mesh.
 
 use super::Mesh;
+use crate::geom::Aabb;
 
 /// One connected part of a mesh.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -17,6 +18,8 @@ pub struct Shell {
     pub volume: f64,
     /// The area in m².
     pub area: f64,
+    /// The box around it, m.
+    pub bounds: Aabb,
 }
 
 impl Shell {
@@ -48,7 +51,14 @@ pub fn shells(mesh: &Mesh) -> Vec<Shell> {
     for &[a, b, c] in &mesh.triangles {
         let root = roots.find(a);
         let index = *place[root as usize].get_or_insert_with(|| {
-            found.push(Shell { first_vertex: root, vertices: 0, triangles: 0, volume: 0.0, area: 0.0 });
+            found.push(Shell {
+                first_vertex: root,
+                vertices: 0,
+                triangles: 0,
+                volume: 0.0,
+                area: 0.0,
+                bounds: Aabb::EMPTY,
+            });
             found.len() - 1
         });
         let shell = &mut found[index];
@@ -63,6 +73,7 @@ pub fn shells(mesh: &Mesh) -> Vec<Shell> {
     for v in 0..mesh.positions.len() as u32 {
         if let Some(index) = place[roots.find(v) as usize] {
             found[index].vertices += 1;
+            found[index].bounds = found[index].bounds.including(mesh.positions[v as usize]);
         }
     }
     found.sort_by_key(|shell| shell.first_vertex);

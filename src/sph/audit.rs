@@ -138,7 +138,7 @@ pub struct Audit {
     compression: Compression,
     rows: Rows,
     max_speed: f64,
-    /// The greatest part of the particles that was faster than [`MOST_MACH`] at once.
+    /// The greatest part of the particles that was faster at once than [`MOST_MACH`], as seen from the mean velocity.
     too_fast: f64,
     /// The figures of the last look.
     now: Instant,

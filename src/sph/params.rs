@@ -48,6 +48,9 @@ pub struct Parameters {
     /// The greatest speed that is expected, m/s. A compressible method derives its speed of sound from it,
     /// unless that is stated. 7.7 by default: a fall through the paper's box, 3 m.
     pub expected_speed: f64,
+    /// The part of it that gravity and walls cause, m/s: all of it but for a velocity that the fluid has at the start. Damping
+    /// does not depend on a velocity that all of the fluid has. 7.7 by default.
+    pub driven_speed: f64,
     /// The method that finds the pressure, with its numbers.
     pub method: Method,
     /// How the walls of the box act on a fluid that moves along them. Obstacles have their own.
@@ -111,6 +114,7 @@ impl Parameters {
             time_step: LONGEST_STEP,
             adaptive: fluid.adaptive,
             expected_speed: 7.7,
+            driven_speed: 7.7,
             method,
             slip: Slip::Free,
             sticks: false,
@@ -152,6 +156,7 @@ impl Parameters {
             ("time_step", self.time_step, Bound::Positive),
             ("wall_friction", self.wall_friction, Bound::NotNegative),
             ("expected_speed", self.expected_speed, Bound::NotNegative),
+            ("driven_speed", self.driven_speed, Bound::NotNegative),
         ];
         for (name, found, bound) in numbers {
             check(name, found, bound.admits(found), &bound.to_string())?;

@@ -3,7 +3,7 @@
 use crate::cli::{PAWN, SMALL, contract};
 use crate::tool::{rfm, rfm_reading, root};
 
-const MESH_KEYS: [&str; 13] = [
+const MESH_KEYS: [&str; 14] = [
     "schema",
     "vertices",
     "triangles",
@@ -16,6 +16,7 @@ const MESH_KEYS: [&str; 13] = [
     "max_distance",
     "rms_distance",
     "thin_cells",
+    "small_components",
     "evaluations",
 ];
 

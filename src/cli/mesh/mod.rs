@@ -83,7 +83,8 @@ pub(super) fn run(shared: &Shared, options: &Options) -> Result<(), Failure> {
         Some(grid) => thin_cells((&solid, &*surface), grid, options, times.meshing)?,
     };
     times.checking = milliseconds(started);
-    remark(&solid, &mesh, (&thin, grid.as_ref()), options);
+    let small = small_components(&report, grid.as_ref());
+    remark(&solid, (&mesh, small), (&thin, grid.as_ref()), options);
     if mesh.triangles.is_empty() {
         return nothing_to_write(shared, options, (&solid, &report, &thin, &times));
     }
@@ -97,7 +98,8 @@ pub(super) fn run(shared: &Shared, options: &Options) -> Result<(), Failure> {
         warn_of_rounding(path, &mesh, grid.as_ref());
     }
     let names = (solid.name(), options.method.name());
-    let summary = MeshSummary::new(names, &report, &thin, quality, simplified.as_ref(), times);
+    let mut summary = MeshSummary::new(names, &report, &thin, quality, simplified.as_ref(), times);
+    summary.small_components = small;
     if shared.json {
         return output::json(&summary);
     }
@@ -306,11 +308,26 @@ fn measured(
     Ok((quality, found))
 }
 
+/// The longest side, in cells, of a component that the grid shows roughly at best.
+const SMALL: f64 = 2.0;
+
+/// The number of components that are so small that each of their faces lies in one or two cells.
+fn small_components(report: &mesh::Report, grid: Option<&Grid>) -> usize {
+    let Some(grid) = grid else { return 0 };
+    let least = SMALL * grid.spacing().max_element();
+    report.component_bounds.iter().filter(|bounds| bounds.size().max_element() < least).count()
+}
+
 /// Triangles that are compared with one another in a few tenths of a second.
 const MOST_COMPARED: usize = 300_000;
 
 /// Says on standard error what the grid could not see, and why a mesh is empty.
-fn remark(solid: &Solid, mesh: &Mesh, (thin, grid): (&ThinCells, Option<&Grid>), options: &Options) {
+fn remark(
+    solid: &Solid,
+    (mesh, small): (&Mesh, usize),
+    (thin, grid): (&ThinCells, Option<&Grid>),
+    options: &Options,
+) {
     if let Some(grid) = grid.filter(|_| thin.count > 0) {
         let what = if thin.is_wedge {
             "the mesh shows sharp edges and tips blunt"
@@ -318,6 +335,14 @@ fn remark(solid: &Solid, mesh: &Mesh, (thin, grid): (&ThinCells, Option<&Grid>),
             "the mesh does not show all of what is thinner than two cells:"
         };
         note(format!("{what} {}", hidden(thin, grid)));
+    }
+    if small > 0 {
+        let (are, they) = if small == 1 { ("is", "it is") } else { ("are", "they are") };
+        let parts = output::counted(small, "component");
+        note(format!(
+            "{parts} of the mesh {are} less than two cells across: so few cells show where {they}, and neither shape nor \
+             volume; --cells with more, or a --box around one, shows these"
+        ));
     }
     // faces of walls and gaps that lie in one cell may pass through each other; dual contouring keeps them apart
     let is_looked_at = options.method == MeshMethod::Mc && mesh.triangles.len() <= MOST_COMPARED;

@@ -41,6 +41,8 @@ pub(super) struct MeshSummary {
     rms_distance: f64,
     /// `None` where the search for them was ended.
     thin_cells: Option<usize>,
+    /// Components less than two cells across, whose shape and volume are rough.
+    pub small_components: usize,
     evaluations: u64,
     /// The time of the whole: to mesh, to simplify and measure, to check, and to write.
     milliseconds: f64,
@@ -116,6 +118,7 @@ impl MeshSummary {
             max_distance: report.max_distance,
             rms_distance: report.rms_distance,
             thin_cells: (!thin.ended).then_some(thin.count),
+            small_components: 0,
             evaluations: report.evaluations,
             milliseconds: times.total(),
             meshing_milliseconds: times.meshing,

@@ -110,6 +110,11 @@ impl Wall {
         wall
     }
 
+    /// −dλ/dδ of a plane that takes the part λ of a kernel.
+    pub fn slope_at(&self, part: f64) -> f64 {
+        self.kernel.slope(self.distance_of(part))
+    }
+
     /// The distance δ = d/h of a plane that takes the part λ of a kernel. λ is between 0 and 1.
     pub fn distance_of(&self, part: f64) -> f64 {
         let small = part.min(1.0 - part);

@@ -17,13 +17,14 @@
 //! move strike the fluid in it.
 
 use glam::DVec3;
+use rayon::prelude::*;
 
 use super::solver::Solver;
 use super::walls::Walls;
 use crate::sph::{
     checkpoint::{Checkpoint, CheckpointError},
     core::Core,
-    particles::{Vectors, add_scaled},
+    particles::{CHUNK, Vectors, add_scaled},
     reaction::Reaction,
 };
 
@@ -31,7 +32,9 @@ use crate::sph::{
 const PRESSURE: &str = "pressure ahead";
 const STEP: &str = "step ahead";
 
-/// Fluid whose pressure carries this part of its weight does not fall freely.
+/// Fluid that bears no more than this part of its weight falls freely, and that which bears the other part does not. In
+/// between it does in part.
+const FREE: f64 = 0.25;
 const SUPPORTED: f64 = 0.5;
 
 /// What acts in advance.
@@ -92,21 +95,38 @@ impl Ahead {
     }
 
     /// Lets particles that fall freely go less far: with the velocity of the end of a step they would go too far by half of
-    /// what gravity gives in it. Adds gravity times `factor` to the ways or velocities of particles, as far as they fall;
-    /// `push` is their acceleration by the pressure of the step, m/s². Gravity that depends on the place acts from the
-    /// middle of one step to that of the next anyway.
-    pub fn fall_less(&self, core: &Core, push: &Vectors, ways: &mut Vectors, factor: f64) {
+    /// what gravity gives in it. Adds gravity times `factor` to the ways or velocities of particles, as far as they fall:
+    /// as far as the accelerations by the pressure of the step, `push`, and by surface tension, m/s², leave them to gravity.
+    /// (The skin of a drop is held by both. By its pressure alone it would not fall with the drop.) Gravity that depends on
+    /// the place acts from the middle of one step to that of the next anyway.
+    pub fn fall_less(
+        &self,
+        core: &Core,
+        (push, tension): (&Vectors, Option<&Vectors>),
+        ways: &mut Vectors,
+        factor: f64,
+    ) {
         let g = core.parameters.pull();
-        if core.gravity_field.is_some() || g == DVec3::ZERO {
+        if core.gravity_field.is_some() || g == DVec3::ZERO || factor == 0.0 {
             return;
         }
-        for (i, push) in push.iter().enumerate() {
-            let carried = (push + 0.5 * self.push.get(i)).length() / g.length();
-            let falls = (1.0 - carried / SUPPORTED).max(0.0);
-            if falls > 0.0 {
-                ways.set(i, ways.get(i) + factor * falls * g);
-            }
-        }
+        let (weight, given) = (g.length(), factor * g);
+        let falls = |i: usize| {
+            let tension = tension.map_or(DVec3::ZERO, |tension| tension.get(i));
+            let borne = (push.get(i) + 0.5 * self.push.get(i) + tension).length() / weight;
+            ((SUPPORTED - borne) / (SUPPORTED - FREE)).clamp(0.0, 1.0)
+        };
+        let Vectors { x, y, z } = ways;
+        x.par_chunks_mut(CHUNK)
+            .zip(y.par_chunks_mut(CHUNK))
+            .zip(z.par_chunks_mut(CHUNK))
+            .enumerate()
+            .for_each(|(chunk, ((x, y), z))| {
+                for k in 0..x.len() {
+                    let change = falls(CHUNK * chunk + k) * given;
+                    (x[k], y[k], z[k]) = (x[k] + change.x, y[k] + change.y, z[k] + change.z);
+                }
+            });
     }
 
     fn add_held(&self, core: &mut Core, time: f64) {

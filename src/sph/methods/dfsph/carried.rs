@@ -84,9 +84,9 @@ impl Carried {
     /// beginning: ā acts in the middle of the step.
     pub fn note_work(&self, core: &Core, dt: f64) {
         let Some(contacts) = core.contacts.as_ref().filter(|_| self.is_led) else { return };
-        for (i, acceleration) in self.acceleration.iter().enumerate() {
-            contacts.add_work(i, 0.5 * dt * dt * acceleration.length_squared());
-        }
+        // ā is the same everywhere
+        let by_walls = self.of(0) - core.parameters.pull();
+        contacts.add_work(0, 0.5 * dt * dt * self.of(0).dot(by_walls) * self.acceleration.x.len() as f64);
     }
 
     /// Takes ā from the motion of the vessel, if it moves as one, at the beginning of a step; the last one took `last_dt`, s.
@@ -180,7 +180,7 @@ impl Carried {
         }
         self.vessel = match checkpoint.get(VESSEL)? {
             [] => None,
-            &[x, y, z] => Some(DVec3::new(x, y, z)),
+            &[x, y, z] if x.is_finite() && y.is_finite() && z.is_finite() => Some(DVec3::new(x, y, z)),
             _ => return Err(CheckpointError::Column(VESSEL.into())),
         };
         Ok(())

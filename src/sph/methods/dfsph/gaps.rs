@@ -60,9 +60,8 @@ impl Gaps {
         self.with_walls.clone_from(&forces.rate);
         self.open.clear();
         self.open.resize(velocity.x.len(), 0.0);
-        for (i, _) in walls.found() {
-            self.open[*i as usize] = 1.0;
-        }
+        // rates are linear in the open parts: all that the walls before these gaps add is what open ones would take
+        self.closing.iter().for_each(|i| self.open[*i as usize] = 1.0);
         forces.find_rate_of(core, walls, velocity, RateOf::BeforeGaps(whole, &self.open));
         self.open.fill(0.0);
         let mut is_any_open = false;

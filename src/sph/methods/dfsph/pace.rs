@@ -5,11 +5,13 @@
 //! at rest. So a common velocity at the start does not count, unless walls have turned it into a motion of parts.
 
 use glam::DVec3;
+use rayon::prelude::*;
 
+use crate::quantity::Bound;
 use crate::sph::{
     checkpoint::{Checkpoint, CheckpointError},
     core::Core,
-    particles::Vectors,
+    particles::{CHUNK, Vectors},
 };
 
 /// Name of both speeds in a checkpoint.
@@ -25,14 +27,11 @@ pub(super) struct Pace {
 }
 
 impl Pace {
-    /// Of a fluid at its start: what is expected is the speed at the start and that of a fall.
+    /// Of a fluid at its start: what is expected is the speed at the start and that by gravity and walls.
     pub fn at_start(core: &Core) -> Self {
         let velocity = &core.particles.velocity;
-        let fastest = greatest(velocity, DVec3::ZERO);
         let found = greatest(velocity, velocity.mean());
-        // rounding leaves nothing of equal squares
-        let by_others = (core.parameters.expected_speed.powi(2) - fastest.powi(2)).max(0.0);
-        Self { expected: (by_others + found.powi(2)).sqrt(), found }
+        Self { expected: core.parameters.driven_speed.hypot(found), found }
     }
 
     /// Looks at the velocities of a step. Returns the speed by which motion is damped, m/s.
@@ -53,7 +52,9 @@ impl Pace {
     /// The column that the checkpoint lacks.
     pub fn restore(&mut self, checkpoint: &Checkpoint) -> Result<(), CheckpointError> {
         *self = match checkpoint.get(NAME)? {
-            &[expected, found] if expected >= 0.0 && found >= 0.0 => Self { expected, found },
+            &[expected, found] if Bound::NotNegative.admits(expected) && Bound::NotNegative.admits(found) => {
+                Self { expected, found }
+            }
             _ => return Err(CheckpointError::Column(NAME.into())),
         };
         Ok(())
@@ -62,5 +63,6 @@ impl Pace {
 
 /// The greatest speed, m/s, as seen from something with the velocity `from`.
 fn greatest(velocity: &Vectors, from: DVec3) -> f64 {
-    velocity.iter().map(|v| (v - from).length_squared()).fold(0.0, f64::max).sqrt()
+    let square = |i: usize| (velocity.get(i) - from).length_squared();
+    (0..velocity.len()).into_par_iter().with_min_len(CHUNK).map(square).reduce(|| 0.0, f64::max).sqrt()
 }

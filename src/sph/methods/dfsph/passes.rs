@@ -223,8 +223,9 @@ pub(super) struct Squeeze<'a> {
     pub continuation: Continuation,
     /// Whether the motion of walls counts. It does for velocities, but not for accelerations by pressure.
     pub with_walls: bool,
-    /// The part of each particle's walls that is not there, if there are gaps.
-    pub open: Option<&'a [f64]>,
+    /// If there are gaps: the part o of each particle's walls that is not there, and its velocity v. What it has in place
+    /// of v is w + o·(v − w) then, where w is M·v.
+    pub open: Option<(&'a [f64], &'a Vectors)>,
 }
 
 impl PairPass<3, 1, 1> for Squeeze<'_> {
@@ -251,8 +252,16 @@ impl PairPass<3, 1, 1> for Squeeze<'_> {
                 Continuation::Linear => (2.0 * wall.gradient, 2.0 * wall.sweep),
                 Continuation::Barrier => (wall.barrier.gradient, wall.barrier.sweep),
             };
-            let rate = gradient.dot(self.velocity.get(i)) - if self.with_walls { sweep } else { 0.0 };
-            self.open.map_or(rate, |open| (1.0 - open[i]) * rate)
+            let completed = self.velocity.get(i);
+            let sweep = if self.with_walls { sweep } else { 0.0 };
+            match self.open {
+                None => gradient.dot(completed) - sweep,
+                // (1 − o)·(∇λ·w − sweep), in which 1 − o divides nothing
+                Some((open, velocity)) => {
+                    let own = velocity.get(i);
+                    (1.0 - open[i]) * (gradient.dot(own) - sweep) + gradient.dot(completed - own)
+                }
+            }
         };
         [rate + self.constants.rest_density * self.walls.in_place_of_fluid(i).map_or(0.0, of_walls)]
     }

@@ -68,6 +68,8 @@
 //!
 //! Invariant: the densities are those of the present positions.
 
+#[cfg(test)]
+mod gap_tests;
 mod pressure;
 #[cfg(test)]
 mod symmetry_tests;
@@ -510,7 +512,8 @@ impl DivergenceFree {
         if let Some((crowding, factor)) = shift(shifting, &self.crowding, core) {
             add_scaled(&mut self.drift, crowding, factor);
         }
-        self.ahead.fall_less(core, &self.forces.push, &mut self.drift, -0.5 * dt);
+        let by_others = (&self.forces.push, self.tension.force(&core.parameters));
+        self.ahead.fall_less(core, by_others, &mut self.drift, -0.5 * dt);
         self.places.find_rate_of(core, &self.walls, &self.drift, RateOf::Velocity(&self.whole));
         let rest = core.parameters.rest_density;
         self.free.clear();
@@ -535,7 +538,8 @@ impl DivergenceFree {
         if let Some((crowding, factor)) = shift(shifting, &self.crowding, core) {
             add_scaled(&mut self.displacement, crowding, factor * dt);
         }
-        self.ahead.fall_less(core, &self.forces.push, &mut self.displacement, -0.5 * dt * dt);
+        let by_others = (&self.forces.push, self.tension.force(&core.parameters));
+        self.ahead.fall_less(core, by_others, &mut self.displacement, -0.5 * dt * dt);
         !is_kept
     }
 }

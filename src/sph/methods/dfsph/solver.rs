@@ -274,6 +274,7 @@ impl Solver {
             RateOf::BeforeGaps(whole, open) => (Some(whole), Some(open)),
             RateOf::Pressure => (None, None),
         };
+        let own = velocity;
         let velocity = if is_completed {
             let completed = &mut self.completed;
             match whole {
@@ -292,7 +293,7 @@ impl Solver {
             velocity,
             continuation: self.continuation,
             with_walls: whole.is_some(),
-            open,
+            open: open.map(|open| (open, own)),
         };
         if let Some(correction) = &self.correction {
             correction.rate(core, pass, &mut self.rate);

@@ -6,8 +6,9 @@
 //! before they pressed again. The front of the water lost a part of its volume, and got energy when it met the next wall.
 //!
 //! But a density below the rest density is as good as the rest density where nothing pulls. So what a wall takes away by
-//! its own motion lowers no density below that. What a particle loses by moving away from a wall it gets back there, and
-//! that stays as it is. If the wall returns, the gap is closed before it compresses anything
+//! leaving lowers no density below that. It leaves if it takes more in a step than the particle's own motion could: if it
+//! moves more than twice as fast as the particle follows it. What a particle loses by moving away from a wall it gets back
+//! there, and that stays as it is, as does what a wall takes by which a particle is turned back on its way. If the wall returns, the gap is closed before it compresses anything
 //! ([`rate_into_gap`](super::rates)).
 
 use rayon::prelude::*;
@@ -57,7 +58,7 @@ impl OfWalls {
                 if density[k] < least {
                     let by_motion = 0.5 * dt * (rate_before[k] + rate[k]);
                     let taken = part_before[k] + by_motion - part[k];
-                    // a wall that stops or moves a particle on its way takes nothing
+                    // a wall that stops a particle on its way, or pushes it, changes its rate by so much at most
                     if taken > dt * (rate_before[k].abs() + rate[k].abs()) {
                         density[k] = least.min(density[k] + taken);
                     }

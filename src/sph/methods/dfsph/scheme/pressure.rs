@@ -1,17 +1,19 @@
 //! The pressures of a step: those that particles bear, those around them that are reported, and how long a step they
 //! allow.
 
-use glam::DMat3;
+use glam::{DMat3, DVec3};
+use rayon::prelude::*;
 
 use super::super::super::shifting::depth;
 use super::super::ADVECTION;
 use super::super::hydrostatic::Hydrostatic;
 use super::super::passes::{Constants, Field};
+use super::super::walls::WallsNear;
 use super::DivergenceFree;
 use crate::sph::{
     core::Core,
     params::Parameters,
-    particles::{Particles, add_scaled},
+    particles::{CHUNK, Particles, add_scaled},
     reaction::Reaction,
 };
 
@@ -43,11 +45,11 @@ impl DivergenceFree {
 
     /// The longest step, s, in which no particle comes nearer to a wall, which may move, than it may move in a step.
     pub(super) fn approach_dt(&self, core: &Core) -> f64 {
-        let approach = self.walls.found().iter().map(|(i, (wall, _))| {
-            let per_gradient = wall.gradient.dot(core.particles.velocity.get(*i as usize)) - wall.sweep;
-            if per_gradient > 0.0 { per_gradient / wall.gradient.length() } else { 0.0 }
-        });
-        ADVECTION * core.parameters.spacing() / approach.fold(0.0, f64::max)
+        let approach = |(i, (wall, _)): &(u32, (WallsNear, DMat3))| {
+            approach_speed(core, wall, core.particles.velocity.get(*i as usize))
+        };
+        let found = self.walls.found().par_iter().with_min_len(CHUNK / 4);
+        ADVECTION * core.parameters.spacing() / found.map(approach).reduce(|| 0.0, f64::max)
     }
 
     /// The pressure that the fluid of a sealed vessel has as one that is carried along, under gravity and with the bodies
@@ -164,6 +166,17 @@ impl DivergenceFree {
             means.zip(&by_weight).for_each(|(mean, most)| *mean += growth * mean.clamp(0.0, *most));
         }
     }
+}
+
+/// How fast a particle comes nearer to the walls, m/s. Between walls that face each other ∇λ vanishes, but not what their
+/// motion makes of λ: it counts as that of a single plane which takes as much of the kernel.
+pub(super) fn approach_speed(core: &Core, wall: &WallsNear, velocity: DVec3) -> f64 {
+    let rate = wall.gradient.dot(velocity) - wall.sweep;
+    if rate <= 0.0 {
+        return 0.0;
+    }
+    let of_plane = core.wall().slope_at(wall.part) / core.parameters.support_radius;
+    rate / wall.gradient.length().max(of_plane)
 }
 
 /// The weight of a step's pressure in a mean over the relaxation time. Until that has passed, the mean is taken since

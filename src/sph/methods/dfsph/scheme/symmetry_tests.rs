@@ -13,7 +13,7 @@ use crate::sph::{
     walls::{Boundary, BroadPhase, Maps},
 };
 
-const SPACING: f64 = 2e-4;
+pub(super) const SPACING: f64 = 2e-4;
 
 /// Particles in disorder in a corner of a box, with a surface towards its middle.
 fn in_a_corner() -> Core {
@@ -27,7 +27,7 @@ fn in_a_full_box() -> Core {
     in_a_box(parameters, 11, 11.0)
 }
 
-fn parameters() -> Parameters {
+pub(super) fn parameters() -> Parameters {
     Parameters { expected_speed: 0.1, precision: Precision::F64, ..Parameters::of(Dfsph::default(), SPACING) }
 }
 
@@ -39,6 +39,11 @@ fn in_a_box(parameters: Parameters, side: usize, width: f64) -> Core {
         let jitter = DVec3::new((7.0 * n as f64).sin(), (11.0 * n as f64).sin(), (13.0 * n as f64).sin());
         particles.push(SPACING * (cell + 0.5 + 0.4 * jitter), DVec3::ZERO);
     }
+    of_particles(parameters, particles, width)
+}
+
+/// Particles in a box `width` spacings wide.
+pub(super) fn of_particles(parameters: Parameters, particles: Particles, width: f64) -> Core {
     let boundary = Boundary {
         domain: Aabb::new(DVec3::ZERO, DVec3::splat(width * SPACING)),
         wall_restitution: 0.0,
