@@ -22,9 +22,6 @@ use crate::ir::{self, Binary, Node, Unary};
 /// Distances of first order level off at this number of radii.
 const FARTHEST: f64 = 8.0;
 
-/// How far a rounded *or* reaches beyond both of its parts, as a part of the radius: 1 − 1/√2.
-const FILLET: f64 = 0.292_893_218_813_452_5;
-
 /// The radius of edges that point outwards, and of those that point inwards if they are rounded.
 struct Radii {
     outer: Node,
@@ -37,8 +34,8 @@ struct Radii {
 #[derive(Clone, Copy)]
 struct Rounded {
     field: Node,
-    /// Positive wherever the field is, and bounded where the parts are.
-    around: Node,
+    /// The most rounded *or*s on the way to a part.
+    fillets: i32,
     /// Half of the thickness of a single formula. Infinite where none is known.
     half: f64,
 }
@@ -58,7 +55,7 @@ impl Lowering<'_> {
         let within = ir::reach(&self.module.graph, shape);
         let mut thinnest = f64::INFINITY;
         let mut done: FxHashMap<Side, Rounded> = FxHashMap::default();
-        for side in order {
+        for &side in &order {
             if self.over_budget(span) {
                 return None;
             }
@@ -77,20 +74,52 @@ impl Lowering<'_> {
                     let Known { field, greatest, .. } = self.distance(side.node, within, &radii, span);
                     if side.negated {
                         let field = self.unary(Unary::Neg, field, span);
-                        Rounded { field, around: field, half: f64::INFINITY }
+                        Rounded { field, fillets: 0, half: f64::INFINITY }
                     } else {
-                        Rounded { field, around: field, half: greatest }
+                        Rounded { field, fillets: 0, half: greatest }
                     }
                 }
             };
             done.insert(side, new);
         }
-        let Rounded { field, around, .. } = done[&root];
-        let fillets = joints.values().any(|joint| matches!(joint, Joint::Or(_))) && radii.inner.is_some();
+        let Rounded { field, fillets, .. } = done[&root];
         if !self.warn_of_nothing_left(field, within, radii.length, span) {
             self.warn_of_thin_part(thinnest, radii.length, span);
         }
-        Some(if fillets { self.around(field, around, span) } else { field })
+        let Some(inner) = radii.inner.filter(|_| fillets > 0) else { return Some(field) };
+        let depth = self.constant(fillet_depth(fillets));
+        let wider = self.binary(Binary::Mul, depth, inner, span);
+        let around = self.wider_parts((&order, &joints), &done, wider, span);
+        let Some(around) = around else { return Some(field) };
+        // the ball around it tells where it ends only roughly
+        self.module.graph.enclose(field, around);
+        Some(self.around(field, around, span))
+    }
+
+    /// The parts grown by a length and joined by the least and the greatest: positive wherever the rounded shape is, which
+    /// reaches beyond its parts by no more, see [`fillet_depth`], and bounded where they are.
+    fn wider_parts(
+        &mut self,
+        (order, joints): (&[Side], &FxHashMap<Side, Joint>),
+        rounded: &FxHashMap<Side, Rounded>,
+        by: Node,
+        span: Span,
+    ) -> Option<Node> {
+        let mut wider: FxHashMap<Side, Node> = FxHashMap::default();
+        for side in order {
+            let node = match joints[side] {
+                Joint::Same(other) => wider[&other],
+                Joint::And([a, b]) | Joint::Least([a, b]) => {
+                    self.binary(Binary::Min, wider[&a], wider[&b], span)
+                }
+                Joint::Or([a, b]) | Joint::Greatest([a, b]) => {
+                    self.binary(Binary::Max, wider[&a], wider[&b], span)
+                }
+                Joint::Leaf => self.binary(Binary::Add, rounded[side].field, by, span),
+            };
+            wider.insert(*side, node);
+        }
+        order.last().map(|root| wider[root])
     }
 
     fn radii(&mut self, values: &[(Value, Span)]) -> Option<Radii> {
@@ -127,7 +156,7 @@ impl Lowering<'_> {
         let [a, b] = parts;
         Rounded {
             field: self.binary(op, a.field, b.field, span),
-            around: self.binary(op, a.around, b.around, span),
+            fillets: a.fillets.max(b.fillets),
             half: f64::INFINITY,
         }
     }
@@ -141,8 +170,7 @@ impl Lowering<'_> {
         let arc = self.binary(Binary::Sub, level, short, span);
         // never above the least but for rounding; said twice, bounds are found from either part
         let field = self.binary(Binary::Min, least, arc, span);
-        let around = self.binary(Binary::Min, parts[0].around, parts[1].around, span);
-        Rounded { field, around, half: f64::INFINITY }
+        Rounded { field, fillets: parts[0].fillets.max(parts[1].fillets), half: f64::INFINITY }
     }
 
     fn rounded_or(&mut self, parts: [Rounded; 2], radii: &Radii, span: Span) -> Rounded {
@@ -154,12 +182,9 @@ impl Lowering<'_> {
         let negative = self.unary(Unary::Neg, radius, span);
         let level = self.binary(Binary::Min, negative, most, span);
         let arc = self.binary(Binary::Add, level, over, span);
-        let part = self.constant(FILLET);
-        let wider = self.binary(Binary::Mul, part, radius, span);
-        let around = self.binary(Binary::Max, parts[0].around, parts[1].around, span);
         Rounded {
             field: self.binary(Binary::Max, most, arc, span),
-            around: self.binary(Binary::Add, around, wider, span),
+            fillets: 1 + parts[0].fillets.max(parts[1].fillets),
             half: f64::INFINITY,
         }
     }
@@ -192,5 +217,29 @@ impl Lowering<'_> {
         let field = self.binary(Binary::DivOrZero, leaf, root, span);
         self.module.graph.enclose(field, leaf);
         Known { field, greatest: f64::INFINITY, square: None }
+    }
+}
+
+/// How far a chain of rounded *or*s reaches beyond its parts, as a part of the radius r: 1 − 2^(−n/2). A rounded *or* of a and
+/// b that is above −s·r, with s below 1, has one of both above −(1 − (1 − s)/√2)·r, as the arc says. So n of them that are
+/// positive, s = 0, have a part above minus this, and no chain reaches farther than r.
+fn fillet_depth(fillets: i32) -> f64 {
+    1.0 - 0.5_f64.powf(0.5 * f64::from(fillets))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_chain_of_fillets_reaches_as_far_as_its_arcs() {
+        // the farthest point of the arc of two planes, which is a part of the next one
+        let next = |depth: f64| 1.0 - (1.0 - depth) / 2_f64.sqrt();
+        let mut depth = 0.0;
+        for fillets in 1..60 {
+            depth = next(depth);
+            assert!((fillet_depth(fillets) - depth).abs() < 1e-14, "{fillets}");
+        }
+        assert!(depth < 1.0);
     }
 }

@@ -10,8 +10,10 @@
 //! ```
 //!
 //! The second is Σ n_k² = 1, because a line along k meets dA·|n_k| of the surface. Places of the lines are those of
-//! the additive recurrence with the powers of 1/p, p³ = p + 1 (Roberts 2018), which no alignment of the solid
-//! disturbs, shifted at random in each set (Cranley & Patterson 1976).
+//! the additive recurrence with the powers of 1/p, p³ = p + 1 (Roberts 2018), shifted at random in each set (Cranley &
+//! Patterson 1976). The sets are mirrored, too: an edge that lies as the places of one set do would else be missed by
+//! all of them alike. (Of the two wedges x ≤ y ≤ z and x ≥ y ≥ z in a ball all sets along z missed something, and the
+//! volume was off by 2.4 of its errors.)
 
 use glam::{DVec2, DVec3};
 use rayon::prelude::*;
@@ -114,7 +116,10 @@ pub fn by_lines(field: &dyn Field, bounds: &Aabb, watch: &dyn Watch) -> Option<B
 fn place(set: usize, axis: usize, line: usize) -> DVec2 {
     let [x, y] = [0, 1].map(|side| random::nth((6 * set + 2 * axis + side) as u64));
     let shift = DVec2::new(x, y);
-    (shift + (line as f64) * STEP).fract()
+    let step = if set.is_multiple_of(2) { STEP } else { DVec2::new(STEP.y, STEP.x) };
+    let step = if (set / 2).is_multiple_of(2) { step } else { DVec2::new(-step.x, step.y) };
+    let at = shift + (line as f64) * step;
+    at - at.floor()
 }
 
 /// What lines along one axis have met.

@@ -56,6 +56,16 @@ fn rounded_and_offset_shapes_end_where_their_parts_do() {
     check("cone(1,1).offset(0.2)", [-wide, -wide, -0.2], [wide, wide, high], 1e-5);
 }
 
+/// However many parts a fillet joins, it reaches beyond them by no more than its radius.
+#[test]
+fn a_row_of_fillets_ends_near_its_parts() {
+    let row = solid("(any i in 0..30: box([0.1*i, 0, 0], [0.1*i + 0.17, 1, 1])).round(0.1)");
+    let Bounds::Within(found) = *row.bounds() else { panic!("{:?}", row.bounds()) };
+    let parts = Aabb::new(DVec3::ZERO, DVec3::new(3.07, 1.0, 1.0));
+    assert_eq!(parts.grown(0.1).union(&found), parts.grown(0.1), "{found:?}");
+    assert_eq!(found.union(&sampled(&row, &parts.grown(0.2), 200_000)), found);
+}
+
 /// A chamfer that is rounded ends where it did, and by the radius less at its edges.
 #[test]
 fn a_chamfer_that_is_rounded_has_bounds() {

@@ -284,6 +284,19 @@ fn components_are_those_of_cells_where_gaps_are_not_resolved() {
     assert_eq!((&solid["resolved"], &solid["components"]), (&false.into(), &1.into()), "{solid}");
 }
 
+/// Two wedges that meet along the diagonal of a ball are measured along lines, and each is a sixth of it.
+#[test]
+fn edges_on_a_diagonal_are_measured_within_the_error() {
+    for radius in [1.0, 2.0] {
+        let text = format!("rfm 1\nsolid wedges = x <= y <= z and sphere({radius})");
+        let document = rfm_reading(root(), &["check", "--json", "-"], text.as_bytes()).expect(0).json();
+        let solid = &document["solids"][0];
+        let [volume, error] = ["volume", "volume_error"].map(|key| solid[key].as_f64().unwrap());
+        let exact = 4.0 / 9.0 * std::f64::consts::PI * f64::powi(radius, 3);
+        assert!((volume - exact).abs() <= error && error < 2e-3 * exact, "{volume} ± {error}, {exact}");
+    }
+}
+
 /// Where no range of a formula is known, each cell would be divided to the end.
 #[test]
 fn thin_parts_are_not_looked_for_without_ranges() {
