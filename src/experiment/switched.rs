@@ -1,4 +1,4 @@
-//! Obstacles that are one shape or another, as the time says: `if t < 1 s then gate else sphere(0.1)`.
+//! Obstacles that are one shape or another, as the time says: `if t <= 1 then gate else sphere(0.1)`.
 //!
 //! Between two switches such a solid is at rest, and a solid at rest costs a part of one that changes its shape: its
 //! formula has no time, its contacts need not be searched for, and its map is made once. So it is compiled for each of its

@@ -12,6 +12,7 @@ use rfm::sph::{Obstacle, Paper, Parameters, Particles, Simulation};
 use rfm::{Engine, Experiment, Program, Solid};
 
 use crate::random::Random;
+use crate::tool::rfm;
 
 /// Hollow bodies with a wall of 1e-6, and the hollows inside them.
 const SHELLS: &str = "rfm 1
@@ -227,5 +228,48 @@ scene slot {
         }
         // the gate that rises at 0.9 m/s may add a little
         assert!(fastest < 1.02 * 2.2, "{x0}: {fastest} m/s");
+    }
+}
+
+/// A run that is stopped while a wall moves, before a gate opens and after, goes on as if it had not been: what walls have
+/// taken of densities, the velocity of a vessel, and the pace of the fluid are in its checkpoints.
+#[test]
+fn a_run_that_is_stopped_while_walls_move_goes_on_as_if_it_had_not_been() {
+    let gate = |method: &str| {
+        format!(
+            "rfm 1\nsolid gate = if t < 0.04 then box([0.1, -1, -1], [0.12, 1, 1]) else sphere(0.01).move([0.35, 0.05, 0.15])\n\
+             scene s {{\n  box {{ min: [0, 0, 0], max: [0.4, 0.1, 0.2] }}\n  obstacle {{ solid: gate }}\n  \
+             fluid w {{ shape: box([0, 0, 0], [0.1, 0.1, 0.1]), spacing: 2 cm }}\n  method: {method}\n  \
+             run {{ until: 100 ms, save_every: 20 ms }}\n}}\n"
+        )
+    };
+    let tank = "rfm 1\nsolid tank = not box([0, 0, 0], [0.2, 0.1, 0.1]).move([t^2, 0, 0])\n\
+                scene s {\n  box { min: [-0.1, -0.1, -0.1], max: [0.5, 0.2, 0.2], restitution: 0 }\n  \
+                gravity: [0, 0, 0]\n  obstacle { solid: tank, restitution: 0 }\n  \
+                fluid w { shape: box([0, 0, 0], [0.2, 0.1, 0.1]), spacing: 2 cm }\n  method: dfsph\n  \
+                run { until: 100 ms, save_every: 20 ms }\n}\n";
+    for (name, text) in [("wcsph", gate("wcsph")), ("dfsph", gate("dfsph")), ("vessel", tank.to_string())] {
+        let folder = tempfile::tempdir().unwrap();
+        let here = folder.path();
+        std::fs::write(here.join("s.rfm"), text).unwrap();
+        let run = |flags: &[&str]| {
+            let always = ["run", "s.rfm", "--threads", "1", "--no-pictures", "--mesh-cells", "8", "-o"];
+            rfm(here, &[&always[..], flags].concat()).expect(0);
+        };
+        run(&["straight"]);
+        // between two frames before the gate opens, and beside one after
+        run(&["broken", "--steps", "2"]);
+        run(&["broken", "--resume", "--until", "0.06"]);
+        run(&["broken", "--resume"]);
+        for file in [
+            "frames/particles_000003.vtp",
+            "frames/particles_000005.vtp",
+            "history/energy.csv",
+            "history/audit.csv",
+        ] {
+            let [straight, broken] =
+                ["straight", "broken"].map(|of| std::fs::read(here.join(of).join(file)).unwrap());
+            assert!(straight == broken, "{name}: {file} differs");
+        }
     }
 }
