@@ -52,7 +52,7 @@ impl Gaps {
 
     /// Takes from the rates of density in `forces` what walls cause within a step of the length `dt`, s, as long as gaps
     /// before them are open.
-    pub fn open(&mut self, core: &Core, (forces, walls): (&mut Solver, &Walls), whole: &Rigid, dt: f64) {
+    pub fn take(&mut self, core: &Core, (forces, walls): (&mut Solver, &Walls), whole: &Rigid, dt: f64) {
         if self.closing.is_empty() {
             return;
         }

@@ -442,7 +442,7 @@ impl DivergenceFree {
         self.forces.correct(core, &self.walls, is_corrected);
         // the compression without pressure; each iteration finds how much of it s takes away
         self.forces.find_rate_of(core, &self.walls, &core.particles.velocity, RateOf::Velocity(&self.whole));
-        self.gaps.open(core, (&mut self.forces, &self.walls), &self.whole, dt);
+        self.gaps.take(core, (&mut self.forces, &self.walls), &self.whole, dt);
         let found = (&self.forces.rate[..], &self.loaded[..], &self.debt[..]);
         // particles that have a wall of a spacing between them belong to two bodies
         let bodies = core.parameters.fills_vessel.then(|| bodies(core, core.parameters.spacing()));

@@ -41,7 +41,7 @@ impl OfWalls {
     }
 
     /// The columns in which a sum puts the parts and their rates at the end of a step.
-    pub fn found(&mut self) -> [&mut [f64]; 2] {
+    pub fn at_end(&mut self) -> [&mut [f64]; 2] {
         let [part, rate] = &mut self.found;
         [part, rate]
     }

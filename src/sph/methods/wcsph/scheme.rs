@@ -318,7 +318,7 @@ impl Weakly {
         let Vectors { x: cx, y: cy, z: cz } = &mut self.crowding;
         let [mut places, mut drift] = std::mem::take(&mut self.found);
         std::mem::swap(&mut self.rate, &mut self.earlier_rate);
-        let [of_walls, rate_of_walls] = self.of_walls.found();
+        let [of_walls, rate_of_walls] = self.of_walls.at_end();
         let out = [
             &mut x[..],
             y,

@@ -36,7 +36,7 @@ fn rates(gap: f64, speed: f64, dt: f64) -> [f64; 3] {
     let velocity = &core.particles.velocity;
     scheme.forces.find_rate_of(&core, &scheme.walls, velocity, RateOf::Velocity(&scheme.whole));
     let before = scheme.forces.rate[first];
-    scheme.gaps.open(&core, (&mut scheme.forces, &scheme.walls), &scheme.whole, dt);
+    scheme.gaps.take(&core, (&mut scheme.forces, &scheme.walls), &scheme.whole, dt);
     let missing = 0.99 * core.parameters.rest_density - core.particles.density[first];
     [before, scheme.forces.rate[first], missing]
 }
