@@ -23,6 +23,19 @@ pub fn to_thousandths(p: DVec3) -> DVec3 {
     }))
 }
 
+/// A place to print in or around something of this size: three digits behind the point for a metre and more, and more of
+/// them for less.
+pub fn place(p: DVec3, size: f64) -> String {
+    let digits = (3.0 - size.log10().floor()).clamp(3.0, 12.0) as usize;
+    let unit = 10f64.powi(digits as i32);
+    let [x, y, z] = p.to_array().map(|x| match x.abs() < LARGEST_WITH_THOUSANDTHS {
+        // rounded first, so that zero has no sign
+        true => (unit * x).round() / unit + 0.0,
+        false => x,
+    });
+    format!("[{x:.digits$}, {y:.digits$}, {z:.digits$}]")
+}
+
 /// A number to print with six digits; a zero without a sign.
 pub fn significant(x: f64) -> f64 {
     format!("{x:.5e}").parse().unwrap_or(x) + 0.0

@@ -2,7 +2,7 @@
 
 use super::output::counted;
 use rfm::Solid;
-use rfm::geom::{Aabb, to_thousandths};
+use rfm::geom::{Aabb, place};
 use rfm::glam::DVec3;
 use rfm::interval::Interval;
 use rfm::mesh::{Grid, ThinCells};
@@ -43,11 +43,7 @@ pub(super) fn hidden(thin: &ThinCells, grid: &Grid) -> String {
         }
         None => format!("{what} of unknown thickness"),
     };
-    format!(
-        "in {} between {:.3} and {:.3}, the thinnest at {:.3}, {how}",
-        counted(thin.count, "cell"),
-        to_thousandths(thin.bounds.min),
-        to_thousandths(thin.bounds.max),
-        to_thousandths(thin.at)
-    )
+    let size = grid.bounds().size().max_element();
+    let [min, max, at] = [thin.bounds.min, thin.bounds.max, thin.at].map(|p| place(p, size));
+    format!("in {} between {min} and {max}, the thinnest at {at}, {how}", counted(thin.count, "cell"))
 }

@@ -4,7 +4,7 @@
 use super::failure::note;
 use rfm::diagnostic::{Code, Diagnostic, Diagnostics, Severity, Span};
 use rfm::experiment::{self, Body, Taken};
-use rfm::geom::{Aabb, to_thousandths};
+use rfm::geom::{Aabb, place};
 use rfm::glam::DVec3;
 use rfm::ir::Node;
 use rfm::lower::{NamedSolid, Scene};
@@ -73,10 +73,11 @@ pub(super) fn of_solid(
     solid: &Solid,
     searches: &mut Searches,
 ) -> Vec<Diagnostic> {
-    let subject = Subject { name: &named.name, at: named.span, text: definition(program, named) };
     let around = solid.bounds().aabb().map(|bounds| bounds.grown(0.05 * bounds.size().max_element()));
     let uses = |scene: &&Scene| scene.obstacles.iter().any(|obstacle| obstacle.name == named.name);
     let of_scene = program.module().scenes.iter().find(uses).map(|scene| scene.domain);
+    let size = around.or(of_scene).map_or(1.0, |over| over.size().max_element());
+    let subject = Subject { name: &named.name, at: named.span, text: definition(program, named), size };
     let jumps = around.or(of_scene).map_or_else(Vec::new, |over| solid.jumps(&over));
     let singular = of_scene.or(around).map_or_else(Vec::new, |over| singular(solid, &over, &jumps));
     let idle = solid.idle_operands(named.span.source, &mut searches.idle);
@@ -85,7 +86,8 @@ pub(super) fn of_solid(
     }
     let mut found: Vec<Diagnostic> = idle.spans.into_iter().map(|span| subject.idle(span)).collect();
     found.extend(jumps.iter().map(|jump| subject.jump(jump)));
-    found.extend(singular.iter().map(|place| subject.singular(place)));
+    let outside = Subject { size: of_scene.map_or(size, |room| room.size().max_element()), ..subject };
+    found.extend(singular.iter().map(|place| outside.singular(place)));
     found.extend(solid.seam().map(|at| subject.seam(at)));
     // where a formula jumps, differences say nothing of its gradient
     if jumps.is_empty() {
@@ -115,21 +117,24 @@ fn definition(program: &Program, named: &NamedSolid) -> Option<Span> {
 }
 
 /// A solid that warnings are about.
+#[derive(Clone, Copy)]
 struct Subject<'a> {
     name: &'a str,
     /// The place of its name.
     at: Span,
     /// Its formula.
     text: Option<Span>,
+    /// How large it is, m; places in it have as many digits as that takes.
+    size: f64,
 }
 
 impl<'a> Subject<'a> {
     /// A body of a scene by its name. If it is the name of a solid of the file, warnings point to its
     /// formula, and otherwise to the place in the scene.
-    fn of(program: &Program, name: &'a str, place: Span) -> Self {
+    fn of(program: &Program, name: &'a str, place: Span, size: f64) -> Self {
         match program.module().solids.iter().find(|named| named.name == name) {
-            Some(named) => Self { name, at: named.span, text: definition(program, named) },
-            None => Self { name, at: place, text: Some(place) },
+            Some(named) => Self { name, at: named.span, text: definition(program, named), size },
+            None => Self { name, at: place, text: Some(place), size },
         }
     }
 
@@ -175,7 +180,7 @@ impl<'a> Subject<'a> {
     }
 
     fn seam(&self, at: DVec3) -> Diagnostic {
-        let message = format!("ω of solid `{}` is 0 within it, at {}", self.name, point(at));
+        let message = format!("ω of solid `{}` is 0 within it, at {}", self.name, place(at, self.size));
         self.warning(Code::SEAM, self.text, message, "there is a surface without an outside".into())
             .help("let the parts that only touch there overlap; an outline that is turned is drawn beyond its axis, to x < 0 for `.revolve()`")
     }
@@ -190,7 +195,8 @@ impl<'a> Subject<'a> {
             }
         };
         let name = &self.name;
-        let message = format!("ω of solid `{name}` {how} from one sign to the other at {}", point(jump.at));
+        let message =
+            format!("ω of solid `{name}` {how} from one sign to the other at {}", place(jump.at, self.size));
         let what = format!("{} of this does", jump.operation);
         self.warning(Code::JUMP, jump.span, message, what).help(help)
     }
@@ -201,7 +207,8 @@ impl<'a> Subject<'a> {
             Breakage::Pole => "no bound",
         };
         let name = &self.name;
-        let message = format!("ω of solid `{name}` has {what} outside of it, at {}", point(found.at));
+        let message =
+            format!("ω of solid `{name}` has {what} outside of it, at {}", place(found.at, self.size));
         let at = format!("{} of this has none there", found.operation);
         self.warning(Code::SINGULAR, found.span, message, at)
             .help("choose another formula there by `where`, or keep its operand away by `max`")
@@ -357,7 +364,8 @@ pub(super) fn of_experiment(experiment: &Experiment, searches: &mut Searches) ->
     let obstacles = scene.obstacles.iter().map(|obstacle| (&obstacle.name, obstacle.span, Some(obstacle)));
     let bodies = container.chain(obstacles).zip(experiment.bodies());
     for (number, ((name, span, obstacle), body)) in bodies.enumerate() {
-        let subject = Subject::of(experiment.program(), name, span);
+        let size = scene.domain.size().max_element();
+        let subject = Subject::of(experiment.program(), name, span, size);
         let jumps = body.solid.jumps(&scene.domain);
         found.list.extend(jumps.iter().map(|jump| subject.jump(jump)));
         found
@@ -383,8 +391,3 @@ pub(super) fn of_experiment(experiment: &Experiment, searches: &mut Searches) ->
 
 /// The room among many obstacles is not looked at if they have more operations together: that would take seconds.
 const MOST_OPERATIONS_OF_MANY: usize = 100_000;
-
-fn point(p: DVec3) -> String {
-    let DVec3 { x, y, z } = to_thousandths(p);
-    format!("[{x:.3}, {y:.3}, {z:.3}]")
-}
