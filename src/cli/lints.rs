@@ -1,6 +1,7 @@
 //! Warnings about solids and scenes that are valid and most likely not meant: `rfm check` looks for all of
 //! them, editors show them after a pause in typing, and a run shows those that its fluid would meet.
 
+use super::chains::Chains;
 use super::failure::note;
 use rfm::diagnostic::{Code, Diagnostic, Diagnostics, Severity, Span};
 use rfm::experiment::{self, Body, Taken};
@@ -22,23 +23,43 @@ pub(super) struct Searches {
     cut: Vec<String>,
     /// The walls and gaps of the shapes that were looked at: scenes that compare something share their obstacles.
     known: Vec<(Search, [Option<ThinPart>; 2])>,
+    /// The chains of comparisons of the file, once they were asked for.
+    chains: Option<Chains>,
+    /// Operations that are left for chains that are fulfilled in the other order.
+    turned: usize,
 }
 
 /// Maximum number of operations that are spent on operands without effect in all solids of a file together:
 /// about a second.
 const IDLE_OPERATIONS: usize = 30_000_000;
 
+/// Maximum number of operations that are spent on chains of comparisons in all solids of a file together: less than a
+/// second.
+const CHAIN_OPERATIONS: usize = 60_000_000;
+
 /// Maximum number of operations that are spent on the walls and gaps of all scenes together: some seconds.
 const THIN_OPERATIONS: usize = 2_500_000_000;
 
 impl Searches {
     pub fn new() -> Self {
-        Self { idle: IDLE_OPERATIONS, thin: THIN_OPERATIONS, cut: Vec::new(), known: Vec::new() }
+        Self {
+            idle: IDLE_OPERATIONS,
+            thin: THIN_OPERATIONS,
+            cut: Vec::new(),
+            known: Vec::new(),
+            chains: None,
+            turned: CHAIN_OPERATIONS,
+        }
     }
 
     /// Searches that end sooner, for texts that are being written and for runs that wait for the result.
     pub fn short() -> Self {
-        Self { idle: IDLE_OPERATIONS / 10, thin: THIN_OPERATIONS / 10, ..Self::new() }
+        Self {
+            idle: IDLE_OPERATIONS / 10,
+            thin: THIN_OPERATIONS / 10,
+            turned: CHAIN_OPERATIONS / 10,
+            ..Self::new()
+        }
     }
 
     /// The thinnest wall and the thinnest gap of an obstacle that particles at a spacing do not show.
@@ -85,6 +106,9 @@ pub(super) fn of_solid(
         searches.cut.push(named.name.clone());
     }
     let mut found: Vec<Diagnostic> = idle.spans.into_iter().map(|span| subject.idle(span)).collect();
+    let over = around.or(of_scene).unwrap_or(Aabb::new(DVec3::NEG_ONE, DVec3::ONE));
+    let chains = searches.chains.get_or_insert_with(|| Chains::of(program));
+    found.extend(chains.warnings((program, named), &over, solid.time(), &mut searches.turned));
     found.extend(jumps.iter().map(|jump| subject.jump(jump)));
     let outside = Subject { size: of_scene.map_or(size, |room| room.size().max_element()), ..subject };
     found.extend(singular.iter().map(|place| outside.singular(place)));

@@ -10,6 +10,7 @@ macro_rules! say {
 
 mod args;
 mod build;
+mod chains;
 mod check;
 mod choose;
 mod deadline;

@@ -277,7 +277,9 @@ about an axis has an edge on it: draw it beyond the axis, which hides that edge.
     solid can = polygon([[-0.1, 0], [0.5, 0], [0.5, 1], [-0.1, 1]]).revolve()";
 REVERSED_CHAIN = "W0421":
 "`a <= e <= b` is the layer between a and b, as (e − a)·(b − e), whichever of them is greater. Where a is greater than b no
-place fulfils both comparisons, so the ends are likely exchanged.
+place fulfils both comparisons, so the ends are likely exchanged. If the ends depend on the place, each may be the greater one
+somewhere: `x <= y <= z` holds where `z <= y <= x` does as well, which is twice as much as is most often meant. `x <= y and y <= z`
+has one order only. It is told of where a point of the solid is found that belongs to it by the other order alone.
 
     rfm 1
     param low = 2 in 0 .. 5

@@ -49,7 +49,7 @@ pub use contact::Contact;
 pub use depth::Depth;
 pub use engine::{Engine, ProgramKind};
 pub use inspection::{LeafInfo, Remainder};
-pub use lints::{Break, Breakage, Idle, ThinPart, Uneven};
+pub use lints::{Break, Breakage, Idle, ThinPart, TurnedChain, Uneven, turned_chains};
 pub use nearest::{Distance, Distances};
 pub(crate) use programs::block_plan::{BlockPlan, BlockStep, Operation as JoiningOperation, Piece};
 pub(crate) use programs::columns::ColumnPlace;

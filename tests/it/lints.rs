@@ -524,3 +524,44 @@ fn a_volume_that_is_no_number_is_not_called_thin_and_one_of_a_thin_sheet_is_foun
     assert!((figure("volume") - exact).abs() <= figure("volume_error"), "{said} {exact}");
     assert!(figure("volume_error") < 0.01 * exact && figure("lines") > 0.0, "{said}");
 }
+
+/// The volume of each solid, and the messages of `rfm check`, of a text.
+fn checked(text: &str) -> (Vec<f64>, Vec<serde_json::Value>) {
+    let document = rfm_reading(root(), &["check", "-", "--json"], text.as_bytes()).json();
+    let volumes =
+        document["solids"].as_array().unwrap().iter().map(|solid| solid["volume"].as_f64().unwrap());
+    (volumes.collect(), document["diagnostics"].as_array().unwrap().clone())
+}
+
+/// Each of the six orders of x, y and z holds in a sixth of the unit cube.
+#[test]
+fn a_chain_that_holds_in_both_orders_leads_to_the_one_that_is_meant() {
+    let coded = |messages: &[serde_json::Value]| -> Vec<serde_json::Value> {
+        messages.iter().filter(|message| message["code"] == "W0421").cloned().collect()
+    };
+    for text in [
+        "rfm 1\nsolid s = box() and x <= y <= z\n",
+        "rfm 1\nfn steps(e) = z >= e >= x\nsolid s = box() and steps(y)\n",
+        "rfm 1\nsolid s = box() \\ not x <= y <= z\n",
+    ] {
+        let (volumes, messages) = checked(text);
+        let [message] = &coded(&messages)[..] else { panic!("{text}: {messages:?}") };
+        assert!((volumes[0] - 1.0 / 3.0).abs() < 1e-3, "{volumes:?}");
+        let line = text.lines().nth(message["fix"]["line"].as_u64().unwrap() as usize - 1).unwrap();
+        let [start, end] =
+            ["column", "end_column"].map(|end| message["fix"][end].as_u64().unwrap() as usize - 1);
+        let mended = text.replace(&line[start..end], message["fix"]["replacement"].as_str().unwrap());
+        let (volumes, messages) = checked(&mended);
+        assert!((volumes[0] - 1.0 / 6.0).abs() < 1e-3, "{mended}: {volumes:?}");
+        assert!(coded(&messages).is_empty(), "{mended}: {messages:?}");
+    }
+    // one end is the greater everywhere, or where the other one is the rest of the formula cuts it off
+    for text in [
+        "rfm 1\nsolid s = box() and x - 0.1 <= y <= x + 0.1\n",
+        "rfm 1\nsolid s = cylinder(1, 2) and 0 <= z <= 1 - x^2 - y^2\n",
+        "rfm 1\nsolid s = box() and 0 <= z <= 0.5\n",
+    ] {
+        let (_, messages) = checked(text);
+        assert!(coded(&messages).is_empty(), "{text}: {messages:?}");
+    }
+}
