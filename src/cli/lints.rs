@@ -109,7 +109,7 @@ pub(super) fn of_solid(
     let over = around.or(of_scene).unwrap_or(Aabb::new(DVec3::NEG_ONE, DVec3::ONE));
     let chains = searches.chains.get_or_insert_with(|| Chains::of(program));
     found.extend(chains.warnings((program, named), &over, solid.time(), &mut searches.turned));
-    found.extend(jumps.iter().map(|jump| subject.jump(jump)));
+    found.extend(untold(program, &jumps).map(|jump| subject.jump(jump)));
     let outside = Subject { size: of_scene.map_or(size, |room| room.size().max_element()), ..subject };
     found.extend(singular.iter().map(|place| outside.singular(place)));
     found.extend(solid.seam().map(|at| subject.seam(at)));
@@ -118,6 +118,13 @@ pub(super) fn of_solid(
         found.extend(solid.uneven_operands().first().map(|uneven| subject.uneven(uneven)));
     }
     found
+}
+
+/// The jumps that nothing else tells of: that a bend leaves out the ends of its shape is told where it stands.
+fn untold<'j>(program: &Program, jumps: &'j [Break]) -> impl Iterator<Item = &'j Break> {
+    let mut told = if jumps.is_empty() { Vec::new() } else { program.warnings().list };
+    told.retain(|warning| warning.code == Code::LOST_ENDS);
+    jumps.iter().filter(move |jump| told.iter().all(|warning| Some(warning.primary.span) != jump.span))
 }
 
 /// The places in a box at which ω is singular outside of a solid and does not jump.
@@ -391,7 +398,7 @@ pub(super) fn of_experiment(experiment: &Experiment, searches: &mut Searches) ->
         let size = scene.domain.size().max_element();
         let subject = Subject::of(experiment.program(), name, span, size);
         let jumps = body.solid.jumps(&scene.domain);
-        found.list.extend(jumps.iter().map(|jump| subject.jump(jump)));
+        found.list.extend(untold(experiment.program(), &jumps).map(|jump| subject.jump(jump)));
         found
             .list
             .extend(singular(&body.solid, &scene.domain, &jumps).iter().map(|place| subject.singular(place)));

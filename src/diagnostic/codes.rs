@@ -322,6 +322,14 @@ everywhere, so that `45 deg in 0 .. 90` reaches to 90 radians, which are 14 turn
     rfm 1
     param alpha = 45 deg in 0 .. 90                          # 45 deg in 0 .. 90 deg
     solid s = box().rotate_z(alpha)";
+LOST_ENDS = "W0428":
+"`.bend(radius)` makes a circle of the x axis from −π·radius to π·radius, around the line at z = radius. What the shape has beyond
+these ends, or above that line, is left out, and where it is cut off ω may jump. The message says how much of the shape that is, by
+samples. A larger radius has room for it; so has a smaller shape, or one that is moved to the middle first, as by
+`.move([-0.5, 0, 0])`.
+
+    rfm 1
+    solid hook = box([0, 0, 0], [1, 1, 1]).bend(0.05)        # a radius of 1 has room for it";
 LENGTH_AS_AREA = "W0429":
 "Squares of coordinates are an area in square metres, and what they are compared with has the unit of a length:
 `x^2 + y^2 <= 500 mm` is a circle with the radius √0.5 m, not 500 mm. Square the radius, too, or compare `hypot(x, y)` with it.

@@ -111,9 +111,13 @@ impl<'a> Lowering<'a> {
             };
             self.scope.locals.push(local);
         }
-        if source == SourceId::Prelude && name == "torus" {
+        if source == SourceId::Prelude {
             let parameters = self.scope.locals.clone();
-            self.warn_of_spindle(&parameters, span);
+            match name.as_str() {
+                "torus" => self.warn_of_spindle(&parameters, span),
+                "bend" => self.warn_of_lost_ends(&parameters, span),
+                _ => {}
+            }
         }
         let value = self.expr(&function.body);
         self.scope = outer;

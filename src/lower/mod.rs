@@ -8,6 +8,7 @@
 
 mod arguments;
 mod bare_ranges;
+mod bends;
 mod builtins;
 mod choice;
 mod columns;

@@ -565,3 +565,25 @@ fn a_chain_that_holds_in_both_orders_leads_to_the_one_that_is_meant() {
         assert!(coded(&messages).is_empty(), "{text}: {messages:?}");
     }
 }
+
+#[test]
+fn a_bend_with_the_radius_that_is_proposed_keeps_all_of_its_shape() {
+    for (shape, radius) in
+        [("box([-1, 0, 0], [1, 1, 0.1])", 0.3), ("box([-1, 0, 0], [1, 1, 1])", 0.5), ("box()", 0.05)]
+    {
+        let text = |radius: &str| format!("rfm 1\nsolid s = {shape}.bend({radius})\n");
+        let (_, messages) = checked(&text(&radius.to_string()));
+        let codes: Vec<_> = messages.iter().map(|message| &message["code"]).collect();
+        assert_eq!(codes, ["W0428"], "{messages:?}");
+        let help = messages[0]["help"].as_str().unwrap();
+        let enough = help.split(['(', ')']).nth(1).unwrap();
+        let (volumes, messages) = checked(&text(enough));
+        assert!(messages.is_empty(), "{messages:?}");
+        // the line at half of the height is as long as the arc that it becomes at its distance from the middle
+        let (radius, height) =
+            (enough.parse::<f64>().unwrap(), if shape.contains("0.1") { 0.1 } else { 1.0 });
+        let length = if shape == "box()" { 1.0 } else { 2.0 };
+        let expected = length * height * (1.0 - 0.5 * height / radius);
+        assert!((volumes[0] - expected).abs() < 1e-3 * expected, "{shape}: {volumes:?}, not {expected}");
+    }
+}
