@@ -336,6 +336,13 @@ LENGTH_AS_AREA = "W0429":
 
     rfm 1
     solid post = x^2 + y^2 <= 500 mm and 0 <= z <= 1         # x^2 + y^2 <= (500 mm)^2";
+REPLACED = "W0430":
+"The file defines a function with the name of a standard solid or map. From there on the name means the new one in this file, also where it
+is called as a method; the standard solids themselves do not change. If that is what is meant, another name says it better.
+
+    rfm 1
+    fn sphere(r) = box([-r, -r, -r], [r, r, r])              # fn cube(r) = …
+    solid part = sphere(1)";
 FLUID_IN_OBSTACLE = "W0501":
 "Part of the fluid's shape lies inside an obstacle, or outside the box or the container. Those particles are carved off before the
 run starts. `rfm run` counts them. `rfm check` and editors estimate by samples how much of the shape is taken, and tell of it where

@@ -177,6 +177,7 @@ impl<'a> Lowering<'a> {
             Item::Let(definition) => self.definition(definition),
             Item::Function(function) => {
                 if self.may_define(&function.name) && self.may_take(function) {
+                    self.warn_of_replaced(&function.name);
                     self.names.define(self.scope.source, &function.name, Kind::Function(function));
                 }
             }

@@ -11,7 +11,7 @@ use crate::diagnostic::{Code, Diagnostic, SourceId, Span};
 use crate::geom::significant;
 use crate::ir::{Binary, Node};
 use crate::quantity::{Dimension, parse_unit};
-use crate::syntax::ast::{Argument, Expr, ExprKind, Fold, Logic, MulOp};
+use crate::syntax::ast::{Argument, Expr, ExprKind, Fold, Logic, MulOp, Name};
 use crate::syntax::foreign;
 
 impl Lowering<'_> {
@@ -98,6 +98,19 @@ impl Lowering<'_> {
             _ => "write a standard solid such as `sphere(1)`, or an inequality such as `z <= 1`".to_string(),
         };
         self.report(warning.help(help));
+    }
+
+    /// Warns of a function that takes the name of a standard solid or map, as in `fn sphere(r) = box()`.
+    pub fn warn_of_replaced(&mut self, name: &Name) {
+        // what has the name of a function of numbers, such as `cosh`, most often does the same
+        if self.names.is_standard_function(&name.text) && self.scope.source == SourceId::File {
+            let message = format!(
+                "`{0}` is the name of a standard function, and from here on means this one",
+                name.text
+            );
+            let help = format!("give it another name, as in `fn my_{}(…)`", name.text);
+            self.report(Diagnostic::warning(Code::REPLACED, name.span, message).help(help));
+        }
     }
 
     /// Warns of the first operand that is the same formula as one before it. Within functions and folds this
