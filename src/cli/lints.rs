@@ -113,6 +113,7 @@ pub(super) fn of_solid(
     let outside = Subject { size: of_scene.map_or(size, |room| room.size().max_element()), ..subject };
     found.extend(singular.iter().map(|place| outside.singular(place)));
     found.extend(solid.seam().map(|at| subject.seam(at)));
+    found.extend(solid.flat_room().map(|at| subject.flat_room(at)));
     // where a formula jumps, differences say nothing of its gradient
     if jumps.is_empty() {
         found.extend(solid.uneven_operands().first().map(|uneven| subject.uneven(uneven)));
@@ -214,6 +215,16 @@ impl<'a> Subject<'a> {
         let message = format!("ω of solid `{}` is 0 within it, at {}", self.name, place(at, self.size));
         self.warning(Code::SEAM, self.text, message, "there is a surface without an outside".into())
             .help("let the parts that only touch there overlap; an outline that is turned is drawn beyond its axis, to x < 0 for `.revolve()`")
+    }
+
+    fn flat_room(&self, at: DVec3) -> Diagnostic {
+        let place = place(at, self.size);
+        let message =
+            format!("ω of solid `{}` is 0 throughout a part of space, as around {place}", self.name);
+        self.warning(Code::SEAM, self.text, message, "such places count as outside".into()).help(
+            "a part of the formula is 0 there and decides nothing, as `abs(z) <= z` for z > 0: write it so that it is positive \
+             inside and negative outside",
+        )
     }
 
     fn jump(&self, jump: &Break) -> Diagnostic {

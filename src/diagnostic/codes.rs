@@ -274,7 +274,10 @@ have a hole. Only the axes of the scene and the middle axes of the solid are loo
 about an axis has an edge on it: draw it beyond the axis, which hides that edge.
 
     rfm 1
-    solid can = polygon([[-0.1, 0], [0.5, 0], [0.5, 1], [-0.1, 1]]).revolve()";
+    solid can = polygon([[-0.1, 0], [0.5, 0], [0.5, 1], [-0.1, 1]]).revolve()
+
+The same is told if ω is zero throughout a part of space, at all points that were tried: `abs(z) <= z` is the field z − |z|, which is
+0 for z > 0, and nothing is inside there. Write `z >= 0`.";
 REVERSED_CHAIN = "W0421":
 "`a <= e <= b` is the layer between a and b, as (e − a)·(b − e), whichever of them is greater. Where a is greater than b no
 place fulfils both comparisons, so the ends are likely exchanged. If the ends depend on the place, each may be the greater one

@@ -587,3 +587,16 @@ fn a_bend_with_the_radius_that_is_proposed_keeps_all_of_its_shape() {
         assert!((volumes[0] - expected).abs() < 1e-3 * expected, "{shape}: {volumes:?}, not {expected}");
     }
 }
+
+#[test]
+fn omega_that_is_zero_throughout_a_part_of_space_is_told() {
+    for (shape, is_flat) in [
+        ("clamp(z, -0.2, 0.3) >= z and sphere(1)", true),
+        ("abs(z) <= z and sphere(1)", true),
+        ("clamp(z, -0.2, 0.3) >= z - 0.01 and sphere(1)", false),
+        ("box() and not box([0, 0, 0], [0.5, 1, 1]) or box([0, 0, 0], [0.5, 1, 1])", false),
+        ("sphere(1) and not sphere(1)", false),
+    ] {
+        assert_eq!(solid(shape).flat_room().is_some(), is_flat, "{shape}");
+    }
+}

@@ -8,7 +8,7 @@
 //! | `uneven` | operands whose gradients differ by a large factor |
 //! | `chains` | chains of comparisons of which the other order decides |
 //! | `breaks` | places where ω jumps across its surface, and where it has no value |
-//! | `seams` | places within a solid at which ω is zero |
+//! | `seams` | lines within a solid, and parts of space, on which ω is zero |
 //! | `thin` | walls and gaps that are thinner than a length |
 //! | `crossings` | points of the surface, between the nodes of a coarse lattice |
 //!
