@@ -9,6 +9,7 @@ use serde::Serialize;
 use similar::TextDiff;
 
 use super::failure::{Failure, complain};
+use super::message::{Message, message};
 use super::shared::Shared;
 use super::{input, output};
 use crate::cli::output::Shown;
@@ -48,6 +49,8 @@ pub(super) struct Fmt {
 struct Document {
     schema: u32,
     ok: bool,
+    /// Why files cannot be laid out.
+    diagnostics: Vec<Message>,
     files: Vec<Outcome>,
 }
 
@@ -59,16 +62,18 @@ struct Outcome {
 }
 
 pub(super) fn run(shared: &Shared, options: &Fmt) -> Result<(), Failure> {
-    let mut document = Document { schema: 1, ok: true, files: Vec::new() };
+    let mut document = Document { schema: 1, ok: true, diagnostics: Vec::new(), files: Vec::new() };
     let mut usage = None;
     for path in &options.files {
-        let changed = match one(shared, options, path) {
+        let changed = match one(shared, options, path, &mut document.diagnostics) {
             Ok(changed) => Some(changed),
             Err(Failure::Findings) => {
                 document.ok = false;
                 None
             }
             Err(Failure::Usage(message)) => {
+                document.ok = false;
+                document.diagnostics.push(Message::of_command(path, &message));
                 // the other files are laid out all the same
                 usage.replace(message).iter().for_each(|earlier| complain(earlier));
                 None
@@ -103,7 +108,7 @@ fn summarise(files: &[Outcome]) {
 }
 
 /// Lays out one file. Returns whether its text differs from its layout.
-fn one(shared: &Shared, options: &Fmt, path: &Path) -> Result<bool, Failure> {
+fn one(shared: &Shared, options: &Fmt, path: &Path, messages: &mut Vec<Message>) -> Result<bool, Failure> {
     let source = input::read(path)?;
     let spelling = match (options.unicode, options.ascii) {
         (true, _) => Spelling::Unicode,
@@ -111,7 +116,11 @@ fn one(shared: &Shared, options: &Fmt, path: &Path) -> Result<bool, Failure> {
         _ => Spelling::Written,
     };
     let text = format(&source, spelling).map_err(|list| {
-        input::show(&Diagnostics { list, sources: Arc::from([source.clone()]) });
+        let found = Diagnostics { list, sources: Arc::from([source.clone()]) };
+        match shared.json {
+            true => messages.extend(found.list.iter().map(|d| message(d, &found))),
+            false => input::show(&found),
+        }
         Failure::Findings
     })?;
     let changed = *source.text != *text;

@@ -87,10 +87,11 @@ pub(super) fn check(shared: &Shared, source: Source, files: Files) -> Result<Pro
 pub(super) fn program(shared: &Shared, path: &Path) -> Result<Program, Failure> {
     let source = match read(path) {
         Ok(source) => source,
-        Err(unreadable) => {
-            refusal(shared, Vec::new())?;
-            return Err(unreadable);
+        Err(Failure::Usage(reason)) => {
+            refusal(shared, vec![Message::of_command(path, &reason)])?;
+            return Err(Failure::Usage(reason));
         }
+        Err(other) => return Err(other),
     };
     let files = files(shared, &source);
     match check(shared, source, files) {

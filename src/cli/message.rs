@@ -1,8 +1,10 @@
 //! A message of the compiler as other programs read it.
 
+use std::path::Path;
+
 use serde::Serialize;
 
-use rfm::diagnostic::{Diagnostic, Diagnostics, Source, Span};
+use rfm::diagnostic::{Code, Diagnostic, Diagnostics, Severity, Source, Span};
 
 /// A message as other programs read it.
 #[derive(Debug, Serialize)]
@@ -29,6 +31,24 @@ pub(super) struct Fix {
     pub replacement: String,
     /// Whether `--fix` applies it.
     pub safe: bool,
+}
+
+impl Message {
+    /// Why a command could not do what it was asked to with a file; it is about no place in it.
+    pub fn of_command(path: &Path, reason: &str) -> Self {
+        Self {
+            code: Code::COMMAND.0,
+            severity: Severity::Error.to_string(),
+            message: reason.to_string(),
+            file: if path == Path::new("-") { "<stdin>".into() } else { path.display().to_string() },
+            line: 1,
+            column: 1,
+            end_line: 1,
+            end_column: 1,
+            help: None,
+            fix: None,
+        }
+    }
 }
 
 /// A message with its place.

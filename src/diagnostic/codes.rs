@@ -143,6 +143,10 @@ library: they have ω, ∇ω and contacts of every solid.
 
     rfm 1
     solid part = mesh(\"part.stl\", 1 mm)";
+COMMAND = "E0220":
+"A command was asked for something that it cannot do with the file: there is no such file, it cannot be read, or a flag names a
+solid that it does not have. People read the reason alone, and commands end with 2. Programs that asked for messages, by --json or
+--message-format, find it among them under this code; it is about no place in the file, so its place is the beginning.";
 SCENE_KEY = "E0301":
 "The scene does not know this key, or this value of it, at this place. What it knows:
 

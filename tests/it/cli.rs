@@ -115,7 +115,11 @@ fn other_files_are_checked_beside_one_that_is_missing() {
     assert_eq!(document["ok"], false);
     let names: Vec<_> = document["solids"].as_array().unwrap().iter().map(|solid| &solid["name"]).collect();
     assert_eq!(names, ["pawn", "cube"]);
-    for name in ["none.rfm", "nor.rfm"] {
+    let reasons: Vec<_> = document["diagnostics"].as_array().unwrap().iter().collect();
+    assert_eq!(reasons.len(), 2, "{reasons:?}");
+    for (name, reason) in ["none.rfm", "nor.rfm"].into_iter().zip(reasons) {
+        assert_eq!([&reason["code"], &reason["severity"], &reason["file"]], ["E0220", "error", name]);
+        assert_eq!(reason["message"], format!("there is no file `{name}`"));
         assert!(outcome.stderr.contains(&format!("there is no file `{name}`")), "{}", outcome.stderr);
     }
 }

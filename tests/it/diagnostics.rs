@@ -9,9 +9,9 @@ const FOLDERS: [&str; 6] =
 
 /// Codes that no file can raise by itself: for files of more than 256 MiB, for flags of the command line, for a
 /// machine without room, for what the audit of a run finds, and for what --resume misses.
-const NOT_OF_A_FILE: [&str; 12] = [
-    "E0103", "E0211", "E0219", "W0214", "W0413", "W0414", "W0506", "W0511", "W0512", "W0513", "W0517",
-    "W0527",
+const NOT_OF_A_FILE: [&str; 13] = [
+    "E0103", "E0211", "E0219", "E0220", "W0214", "W0413", "W0414", "W0506", "W0511", "W0512", "W0513",
+    "W0517", "W0527",
 ];
 
 /// What a person who runs the file sees: `check`, and for a scene that passes it, the start of a run.

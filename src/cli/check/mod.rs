@@ -104,6 +104,7 @@ fn once(shared: &Shared, options: &Check, named: &mut Vec<PathBuf>) -> Result<()
             Err(Failure::Params) => (document.ok, fits) = (false, false),
             Err(Failure::Usage(message)) => {
                 document.ok = false;
+                document.diagnostics.push(Message::of_command(path, &message));
                 if let Some(earlier) = usage.replace(message) {
                     complain(&earlier);
                 }

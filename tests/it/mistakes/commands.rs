@@ -82,6 +82,9 @@ const COMMANDS: &[(&[&str], i32)] = &[
     (&["run", "empty.rfm", "--json"], 1),
     (&["run", "post.rfm", "--json", "-D", "d=80 mm"], 2),
     (&["mesh", "nofile.rfm", "--json"], 2),
+    (&["check", "nofile.rfm", "--json"], 2),
+    (&["check", "tiny.rfm", "-s", "post", "--json"], 2),
+    (&["fmt", "nofile.rfm", "--json"], 2),
     (&["run", "post.rfm", "--steps", "1", "--cut", "x=9", "-o", "uncut"], 0),
 ];
 
