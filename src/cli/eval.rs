@@ -10,7 +10,7 @@ use glam::DVec3;
 use rayon::prelude::*;
 
 use super::args::{Eval, What};
-use super::failure::Failure;
+use super::failure::{Failure, note};
 use super::progress::{self, Progress};
 use super::shared::Shared;
 use super::{choose, input, output};
@@ -47,8 +47,12 @@ pub(super) fn run(shared: &Shared, options: &Eval) -> Result<(), Failure> {
         None => choose::within_tolerance(&program, &solid)?,
         Some(_) => None, // the user chose the precision
     };
-    let mut writer = Table::new(solid, chosen, options, shared.json);
+    let mut writer = Table::new(solid.clone(), chosen, options, shared.json);
     writer.rows(&options.at)?;
+    if let Some(at) = options.at.iter().find(|p| solid.overflows_at(**p)) {
+        let shown = at.to_array().map(|x| if x.abs() < 1e6 { x.to_string() } else { format!("{x:e}") });
+        note(format!("numbers overflow at {}: ω and its gradient cannot be computed there", shown.join(",")));
+    }
     if let Some(path) = &options.points {
         let name = if path == stdin { "<stdin>".to_string() } else { path.shown().to_string() };
         let reader: Box<dyn Read> = if path == stdin {

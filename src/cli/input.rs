@@ -7,6 +7,7 @@ use std::path::Path;
 use serde::Serialize;
 
 use super::failure::{Failure, note};
+use super::flag_of_name;
 use super::message::{Message, message};
 use super::shared::Shared;
 use crate::cli::output::{self, Shown};
@@ -53,6 +54,11 @@ pub(super) fn missing(path: &Path) -> Failure {
         let hint =
             format!("a solid of `{file}` is chosen by `--solid {name}`, and a scene by `--scene {name}`");
         return Failure::usage(format!("there is no file `{shown}`; {hint}"));
+    }
+    if let Some((flag, file)) = flag_of_name(&shown) {
+        return Failure::usage(format!(
+            "there is no file `{shown}`; what has this name in `{file}` is chosen by `{flag} {shown}`"
+        ));
     }
     let with_ending =
         Some(path.with_extension("rfm")).filter(|other| path.extension().is_none() && other.is_file());

@@ -162,8 +162,12 @@ fn hint(error: &clap::Error) -> Option<String> {
             "a number and its unit are one argument: write `{number}{argument}`, or `\"{number} {argument}\"` in quotes"
         ));
     }
+    if let Some((flag, file)) = flag_of_name(argument) {
+        let (argument, file) = (printable(argument), printable(&file));
+        return Some(format!("`{argument}` of `{file}` is chosen by `{flag} {argument}`"));
+    }
     let key = argument.strip_prefix("--")?.replace('-', "_");
-    if let Some(file) = file_with_param(&key) {
+    if let Some(file) = file_with(&key, "param ") {
         let value = arguments().skip_while(|given| given != argument).nth(1);
         let value = value.filter(|value| parse_quantity(value).is_ok()).unwrap_or_else(|| "…".into());
         return Some(format!("`{key}` is a param of `{}`: write `-D {key}={value}`", printable(&file)));
@@ -188,10 +192,18 @@ fn argument_before(argument: &str) -> Option<String> {
     all.get(at.checked_sub(1)?).cloned()
 }
 
-/// The file among the arguments that declares a param of this name.
-fn file_with_param(name: &str) -> Option<String> {
+/// The flag that chooses the solid or the scene of this name, and the file among the arguments that has it.
+fn flag_of_name(name: &str) -> Option<(&'static str, String)> {
+    let of_kind = |kind, flag| file_with(name, kind).map(|file| (flag, file));
+    let is_run = arguments().nth(1).is_some_and(|command| command == "run");
+    let solid = if is_run { None } else { of_kind("solid ", "-s") };
+    solid.or_else(|| of_kind("scene ", "--scene"))
+}
+
+/// The file among the arguments that defines this name, in a line that begins with the word for what it is.
+fn file_with(name: &str, kind: &str) -> Option<String> {
     let declares = |line: &str| {
-        line.strip_prefix("param ").is_some_and(|rest| rest.split(['=', ' ']).next() == Some(name))
+        line.strip_prefix(kind).is_some_and(|rest| rest.split(['=', ' ', '{']).next() == Some(name))
     };
     let mut files = arguments().filter(|argument| argument.ends_with(".rfm"));
     files.find(|file| std::fs::read_to_string(file).is_ok_and(|text| text.lines().any(declares)))

@@ -195,7 +195,12 @@ pub(super) fn frames(text: &str) -> Result<Frames, String> {
 }
 
 pub(super) fn point(text: &str) -> Result<DVec3, String> {
-    numbers::<3>(text).map(DVec3::from_array)
+    let place = numbers::<3>(text).map(DVec3::from_array)?;
+    if place.is_finite() {
+        Ok(place)
+    } else {
+        Err("the coordinates of a point are finite numbers".to_string())
+    }
 }
 
 /// Three numbers that are not all zero; or what a scene states and the viewer copies:

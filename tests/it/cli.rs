@@ -365,8 +365,11 @@ fn eval_prints_columns_in_the_order_asked_for() {
 
 #[test]
 fn eval_reads_points_and_prints_seventeen_digits() {
-    let outcome =
-        rfm(root(), &["eval", PAWN, "--at", "1.5,1.5,0.5", "--at=-1e-3,0,nan", "--at", "inf,0,0"]).expect(0);
+    // a table may have rows without a place, and a flag is refused
+    let points = b"x,y,z\n1.5,1.5,0.5\n-1e-3,0,nan\ninf,0,0\n";
+    let outcome = rfm_reading(root(), &["eval", PAWN, "--points", "-"], points).expect(0);
+    rfm(root(), &["eval", PAWN, "--at=-1e-3,0,nan"]).expect(2);
+    rfm(root(), &["eval", PAWN, "--at", "inf,0,0"]).expect(2);
     snapshot("cli", "eval", &outcome.transcript());
     let all = ["eval", PAWN, "--at", "1.7,1.5,0.2", "--what", "value,gradient,sign,normal"];
     snapshot("cli", "eval everything", &rfm(root(), &all).expect(0).transcript());
@@ -410,7 +413,8 @@ fn engines_and_precisions_print_the_same() {
         assert_eq!(jit, run("interp"), "{precision}");
         assert_eq!(jit, run("auto"), "{precision}");
     }
-    let outcome = rfm(root(), &["eval", PAWN, "--json", "--at", "0,0,nan"]).expect(0);
+    let asked = ["eval", PAWN, "--json", "--points", "-"];
+    let outcome = rfm_reading(root(), &asked, b"x,y,z\n0,0,nan\n").expect(0);
     contract(&outcome.stdout, &outcome.json(), &["schema", "points"]);
 }
 

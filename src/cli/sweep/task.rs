@@ -152,7 +152,8 @@ impl Task<'_> {
         let (result, documents) = output::captured(|| each(&shared, &folder));
         // of `check` messages are in its document, other commands have shown them
         for message in messages(&documents).filter(|message| message["severity"] == "warning") {
-            note(format!("{}: {}", text_of(message, "code"), text_of(message, "message")));
+            let help = message["help"].as_str().map_or(String::new(), |help| format!("; {help}"));
+            note(format!("{}: {}{help}", text_of(message, "code"), text_of(message, "message")));
         }
         let figures = documents.iter().flat_map(|document| self.command.figures(document, &folder)).collect();
         let (exit, failure) = match &result {
@@ -319,8 +320,12 @@ fn fits(program: &Program, sweep: &Sweep) -> Result<(), Failure> {
     for value in &sweep.values {
         let given = sweep.definition(*value).map_err(Failure::Usage)?;
         if let Some((low, high)) = param.range.filter(|(low, high)| !(*low..=*high).contains(&given.value)) {
+            let in_unit = param.unit.as_ref().filter(|(unit, _)| sweep.unit.is_empty() && unit.factor != 1.0);
+            let hint = in_unit.map_or(String::new(), |(_, unit)| {
+                format!("; numbers without a unit are in SI units: write --sweep {}", sweep.written_in(unit))
+            });
             return Err(Failure::usage(format!(
-                "--sweep {}: {} lies outside {} .. {}, which the file allows",
+                "--sweep {}: {} lies outside {} .. {}, which the file allows{hint}",
                 sweep.name,
                 sweep.shown(*value),
                 param.shown(low),

@@ -106,6 +106,24 @@ fn written(value: f64) -> String {
 }
 
 impl Sweep {
+    /// The same values with a unit, as they are written behind `--sweep`.
+    pub fn written_in(&self, unit: &str) -> String {
+        let (Some(first), Some(last)) = (self.values.first(), self.values.last()) else {
+            return String::new();
+        };
+        let steps = self.values.len() - 1;
+        let even = |i: usize| rounded(first + (last - first) * i as f64 / steps as f64);
+        let is_even = steps > 1 && self.values.iter().enumerate().all(|(i, value)| even(i) == *value);
+        let values = match is_even {
+            true => format!("{}..{} {unit}:{}", written(*first), written(*last), self.values.len()),
+            false => {
+                let all: Vec<String> = self.values.iter().map(|value| written(*value)).collect();
+                format!("{} {unit}", all.join(","))
+            }
+        };
+        format!("{}=\"{values}\"", self.name)
+    }
+
     /// A value as a person writes it.
     pub fn shown(&self, value: f64) -> String {
         match self.unit.as_str() {
@@ -166,6 +184,16 @@ mod tests {
         check("a=5mm, 1, 3 cm", "cm", &[0.5, 1.0, 3.0]);
         let degrees = sweep("a=0..30 deg:4").unwrap().definition(30.0).unwrap();
         assert_eq!((degrees.name.as_str(), degrees.value), ("a", 30.0 * (std::f64::consts::PI / 180.0)));
+    }
+
+    #[test]
+    fn the_same_values_in_a_unit_are_read_back() {
+        for text in ["d=4..8:3", "d=4..8:2", "d=1,2,5,10"] {
+            let (plain, again) =
+                (sweep(text).unwrap(), sweep(text).unwrap().written_in("mm").replace('"', ""));
+            let Sweep { values, unit, .. } = sweep(&again).unwrap();
+            assert_eq!((values, unit.as_str()), (plain.values, "mm"), "{again}");
+        }
     }
 
     #[test]

@@ -115,6 +115,23 @@ impl Solid {
         found
     }
 
+    /// Whether an operation of the formula leaves the range of numbers at a point, and not because a divisor or the
+    /// argument of a logarithm is zero there.
+    pub fn overflows_at(&self, p: DVec3) -> bool {
+        let (graph, _) = self.formula();
+        let nodes: Vec<(Node, Expr)> = graph.nodes().collect();
+        let outputs: Vec<Node> = nodes.iter().map(|(node, _)| *node).collect();
+        let mut values = vec![0.0; nodes.len()];
+        let given = Given { time: self.time(), ..Given::point(p.to_array()) };
+        Interpreter::new(graph, &outputs).eval_given(given, &mut values);
+        let is_plain = |operand: Node| values[operand.index()].is_finite() && values[operand.index()] != 0.0;
+        nodes.iter().any(|(node, expr)| {
+            let mut operands = expr.operands().peekable();
+            let overflows = operands.peek().is_some() && operands.all(is_plain);
+            overflows && values[node.index()].is_infinite()
+        })
+    }
+
     /// Looks for zeros of divisors between nodes of which one at least is outside. All divisors share a budget.
     fn poles(&self, formula: &Formula<'_>, lattice: &Lattice, found: &mut Vec<Break>) {
         let divisors = formula.divisors();

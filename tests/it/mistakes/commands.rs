@@ -85,6 +85,12 @@ const COMMANDS: &[(&[&str], i32)] = &[
     (&["check", "nofile.rfm", "--json"], 2),
     (&["check", "tiny.rfm", "-s", "post", "--json"], 2),
     (&["fmt", "nofile.rfm", "--json"], 2),
+    (&["mesh", "post.rfm", "post"], 2),
+    (&["run", "post.rfm", "drop"], 2),
+    (&["check", "post.rfm", "post"], 2),
+    (&["check", "post.rfm", "--sweep", "d=4..8:3"], 2),
+    (&["eval", "tiny.rfm", "--at", "1mm,0,nan"], 2),
+    (&["eval", "tiny.rfm", "--at", "1e308,0,0"], 0),
     (&["run", "post.rfm", "--steps", "1", "--cut", "x=9", "-o", "uncut"], 0),
 ];
 
