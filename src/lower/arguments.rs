@@ -233,7 +233,19 @@ impl<'a> Lowering<'a> {
             let (what, found) = match (&local.value, wanted) {
                 (Value::Number(_), true) => ("a vector `[a, b, c]`", "a number"),
                 (Value::Vector(_), false) => ("a number", "a vector"),
-                _ => continue,
+                (Value::List(_), false) => ("a number", "a list"),
+                (Value::List(numbers), true) if numbers.len() != 3 => {
+                    self.report_wrong_length(name, local, numbers.len());
+                    return false;
+                }
+                (Value::Text(_), true) => ("a vector `[a, b, c]`", "a text"),
+                (Value::Text(_), false) => ("a number", "a text"),
+                // what is wrong with one of three components is told where the vector is used
+                (Value::Number(_), false)
+                | (Value::Vector(_) | Value::List(_), true)
+                | (Value::Failed, _) => {
+                    continue;
+                }
             };
             let message = format!("`{}` of `{name}` is {what}, found {found}", local.name);
             let numbers: Option<Vec<&str>> = arguments
@@ -258,6 +270,18 @@ impl<'a> Lowering<'a> {
             return false;
         }
         true
+    }
+
+    /// Reports a list where a standard solid takes a vector, as in `sphere(1, [1, 0])`.
+    fn report_wrong_length(&mut self, function: &str, local: &Local, length: usize) {
+        let parameter = &local.name;
+        let message = format!("`{parameter}` of `{function}` has three numbers `[a, b, c]`, found {length}");
+        let diagnostic = Diagnostic::error(Code::WRONG_TYPE, local.span, message);
+        let written = self.written_at(local.span).and_then(|text| text.strip_suffix(']'));
+        self.report(match written.filter(|text| length == 2 && text.starts_with('[')) {
+            Some(pair) => diagnostic.help(format!("write `{}, 0]` for a place at z = 0", pair.trim_end())),
+            None => diagnostic,
+        });
     }
 
     /// The parameter that an argument is for; a name that the function does not know is reported.

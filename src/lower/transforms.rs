@@ -5,6 +5,7 @@
 
 use super::dimensions::{Measure, is_foreign_quantity};
 use super::lowering::Lowering;
+use super::names::Kind;
 use super::value::Value;
 use crate::diagnostic::{Code, Diagnostic, Span};
 use crate::ir::{Axis, Binary, Node, Unary, UnaryFunction};
@@ -188,7 +189,11 @@ impl<'a> Lowering<'a> {
             let names: Vec<&str> =
                 METHODS.iter().map(|(name, _)| *name).chain(own.iter().map(String::as_str)).collect();
             let message = format!("shapes have no method `{}`", method.text);
-            let diagnostic = Diagnostic::error(Code::UNKNOWN_NAME, method.span, message)
+            let diagnostic = Diagnostic::error(Code::UNKNOWN_NAME, method.span, message);
+            if let Some(call) = self.as_function(receiver, method, arguments) {
+                return self.fail(diagnostic.at("a function").help(format!("write `{call}`")));
+            }
+            let diagnostic = diagnostic
                 .help(format!("they have {}", names.join(", ")))
                 .suggest(&method.text, names.iter().copied());
             return self.fail(diagnostic);
@@ -250,6 +255,30 @@ impl<'a> Lowering<'a> {
         }
         let Some(shape) = shape else { return Value::Failed };
         self.transformed(shape, transform, &values, span).map_or(Value::Failed, Value::Number)
+    }
+
+    /// The call of a function of this file, or of one that it imports, which is written as a method although its first
+    /// parameter is not called `shape`.
+    fn as_function(&self, receiver: &Expr, method: &Name, arguments: &[Argument]) -> Option<String> {
+        let name = &method.text;
+        let own = self.names.of(self.scope.source, name).map(|global| &global.kind);
+        let called = match own {
+            Some(Kind::Function(_)) => name.clone(),
+            Some(Kind::Value(_) | Kind::Solid(_) | Kind::Scene | Kind::Import(_)) | None => {
+                self.names.in_an_import(self.scope.source, name, true)?
+            }
+        };
+        let given = |argument: &Argument| {
+            let value = self.written(&argument.value)?;
+            Some(match &argument.name {
+                Some(parameter) => format!("{} = {value}", parameter.text),
+                None => value.to_string(),
+            })
+        };
+        let arguments = arguments.iter().map(given);
+        let all: Option<Vec<String>> =
+            std::iter::once(self.written(receiver).map(String::from)).chain(arguments).collect();
+        Some(format!("{called}({})", all.map_or("…".into(), |all| all.join(", "))))
     }
 
     fn wrong_arguments(

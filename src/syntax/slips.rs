@@ -30,7 +30,8 @@ pub(super) struct Slip<'t> {
 impl<'t> Slip<'t> {
     /// The message for this slip; `None` if it is not one of those known here.
     pub fn explained(&self) -> Option<Diagnostic> {
-        let first = self.body_of_statements().or_else(|| self.item_in_braces());
+        let first = self.escaped_quote().or_else(|| self.body_of_statements());
+        let first = first.or_else(|| self.item_in_braces());
         let first = first.or_else(|| self.unit_of_a_vector());
         let first = first.or_else(|| self.unit_taken_for_a_key()).or_else(|| self.import());
         if first.is_some() {

@@ -16,6 +16,9 @@ const POWERS_OF: [&str; 9] = ["sin", "cos", "tan", "sinh", "cosh", "tanh", "log"
 const FUNCTIONS: [&str; 14] =
     ["sin", "cos", "tan", "asin", "acos", "atan", "sinh", "cosh", "tanh", "log", "ln", "exp", "sqrt", "abs"];
 
+/// Standard solids that take numbers.
+const SHAPES: [&str; 6] = ["sphere", "ellipsoid", "cylinder", "cone", "capsule", "torus"];
+
 /// Whether a text ends with the head of a function whose body would follow, on a line that is indented.
 pub(in crate::syntax) fn begins_a_body(text: &str) -> bool {
     let Some((head, indent)) = text.rsplit_once('\n') else { return false };
@@ -73,7 +76,9 @@ impl Slip<'_> {
             "-" => self.name_with_a_dash(),
             "." => self.box_as_a_range().or_else(|| self.fold_of_three()),
             "}" => self.block_without_a_key().or_else(|| self.block_without_braces()),
-            found if found.starts_with(|c: char| c.is_ascii_digit()) => self.vector_without_commas(),
+            found if found.starts_with(|c: char| c.is_ascii_digit()) => {
+                self.vector_without_commas().or_else(|| self.numbers_without_brackets())
+            }
             _ => None,
         }
     }
@@ -93,6 +98,24 @@ impl Slip<'_> {
             Diagnostic::error(Code::SYNTAX, span, format!("`{word}` within a block"))
                 .help("items stand outside of scenes: move the line above the scene that uses it, or close the block with `}`")
         })
+    }
+
+    /// `"a\"b"`: the text ends at the second quote, and the third one does not begin another.
+    pub(super) fn escaped_quote(&self) -> Option<Diagnostic> {
+        let line = self.on_its_line();
+        let (before, behind) = line.rsplit_once("\\\"")?;
+        // the quote that the backslash stands before closes what the one before opens
+        let is_closed = before.split(['#']).count() == 1 && before.matches('"').count() % 2 == 1;
+        if !is_closed || behind.contains('"') {
+            return None;
+        }
+        let at = self.at - line.len() + before.len();
+        let span = Span::new(self.span.source, at, at + 2);
+        let message = "a text has no escapes: it ends at this quote";
+        Some(
+            Diagnostic::error(Code::SYNTAX, span, message)
+                .help("within a text write `'` or `”` in place of `\"`"),
+        )
     }
 
     /// A text where none may stand, which is closed on its line.
@@ -116,7 +139,9 @@ impl Slip<'_> {
     /// `sin x`
     pub(super) fn argument_without_brackets(&self) -> Option<Diagnostic> {
         let function = last_word(self.on_its_line().trim_end());
-        let is_operand = !KEYWORDS.contains(&self.found) && FUNCTIONS.contains(&function);
+        let heads = self.on_its_line().trim_end().strip_suffix(function)?.trim_end();
+        let is_solid = SHAPES.contains(&function) && !ITEM_WORDS.contains(&last_word(heads));
+        let is_operand = !KEYWORDS.contains(&self.found) && (FUNCTIONS.contains(&function) || is_solid);
         is_operand.then(|| {
             let call = match bracketed(self.after()).filter(|inner| fits(&[inner])) {
                 Some(inner) => format!("{function}({}({inner}))", self.found),
@@ -124,6 +149,32 @@ impl Slip<'_> {
             };
             self.unexpected().help(format!("the argument of a function stands in brackets: write `{call}`"))
         })
+    }
+
+    /// `sphere 1`, `cylinder 5 mm, 2`
+    fn numbers_without_brackets(&self) -> Option<Diagnostic> {
+        let head = self.on_its_line().trim_end();
+        let function = last_word(head);
+        let is_name = ITEM_WORDS.contains(&last_word(head.strip_suffix(function)?.trim_end()));
+        if is_name || !(SHAPES.contains(&function) || FUNCTIONS.contains(&function)) {
+            return None;
+        }
+        let line = self.text[self.at..].lines().next()?;
+        let is_number = |word: &str| word.starts_with(|c: char| c.is_ascii_digit() || c == '.');
+        let mut numbers: Vec<String> = Vec::new();
+        for word in line.split([' ', '\t', ',']).filter(|word| !word.is_empty()) {
+            let is_unit = word.chars().all(char::is_alphabetic) && !KEYWORDS.contains(&word);
+            match numbers.last_mut() {
+                _ if is_number(word) => numbers.push(word.to_string()),
+                // with its unit
+                Some(number) if is_unit && !number.contains(' ') => *number = format!("{number} {word}"),
+                Some(_) | None => break,
+            }
+        }
+        let call = format!("{function}({})", numbers.join(", "));
+        let call = if fits(&[&call]) { call } else { format!("{function}(…)") };
+        let what = if numbers.len() > 1 { "arguments stand" } else { "the argument of a function stands" };
+        Some(self.unexpected().help(format!("{what} in brackets: write `{call}`")))
     }
 
     /// `|x|`
