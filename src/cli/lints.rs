@@ -136,7 +136,7 @@ fn singular(solid: &Solid, over: &Aabb, jumps: &[Break]) -> Vec<Break> {
 }
 
 /// The text of a solid's formula in the file.
-fn definition(program: &Program, named: &NamedSolid) -> Option<Span> {
+pub(super) fn definition(program: &Program, named: &NamedSolid) -> Option<Span> {
     program.ast().items.iter().find_map(|item| match item {
         Item::Solid(solid) if solid.name.span == named.span => Some(solid.value.span),
         Item::Solid(_)

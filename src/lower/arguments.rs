@@ -4,6 +4,7 @@ use super::builtins;
 use super::dimensions::{Measure, is_foreign_quantity};
 use super::foreign;
 use super::lowering::{Call, Local, Lowering, Scope};
+use super::module::VaryingSize;
 use super::names::Kind;
 use super::value::Value;
 use crate::diagnostic::{Code, Diagnostic, SourceId, Span};
@@ -95,6 +96,9 @@ impl<'a> Lowering<'a> {
             return self.fail(diagnostic);
         }
         let Some(mut bound) = self.bind((function, source), arguments, span) else { return Value::Failed };
+        if source == SourceId::Prelude && !function.takes_a_shape() {
+            self.remember_varying_sizes(name, &bound, span);
+        }
         let call = Call { function: name.clone(), source, span };
         let mut calls = self.scope.calls.clone();
         calls.push(call);
@@ -122,6 +126,19 @@ impl<'a> Lowering<'a> {
         let value = self.expr(&function.body);
         self.scope = outer;
         value
+    }
+
+    /// Remembers the sizes of a standard solid that depend on the place. They may be meant, as in
+    /// `cylinder(1 + 0.1*sin(z), 3)`, and may be why a solid has no end.
+    fn remember_varying_sizes(&mut self, function: &str, bound: &[Local], call: Span) {
+        for Local { name, value, span, .. } in bound {
+            let Value::Number(node) = value else { continue };
+            if Measure::of(function, name) == Measure::Length && self.depends_on_place(*node) {
+                let call = self.user_span(call);
+                let (function, parameter) = (function.to_string(), name.clone());
+                self.module.varying_sizes.push(VaryingSize { function, parameter, value: *span, call });
+            }
+        }
     }
 
     /// The arguments by the names of their parameters; what does not fit is reported.

@@ -45,7 +45,7 @@ use std::sync::OnceLock;
 
 pub use foreign::known_elsewhere;
 pub use imports::{Imported, unread};
-pub use module::{Module, NamedSolid, OpenParams, ParamValue};
+pub use module::{Module, NamedSolid, OpenParams, ParamValue, VaryingSize};
 pub use options::{Options, SetBy};
 pub use scene::{
     AskedMean, Bounce, Container, Fluid, Gravity, Obstacle, Opening, Picture, Run, Scene, SceneProbe, Skin,

@@ -21,6 +21,8 @@ pub struct Module {
     pub solids: Vec<NamedSolid>,
     /// The scenes, in the order of the file.
     pub scenes: Vec<Scene>,
+    /// Sizes of standard solids that depend on the place.
+    pub varying_sizes: Vec<VaryingSize>,
     /// Dimensions of those params and names of the file, imports apart, whose units tell them.
     pub dimensions: BTreeMap<String, Dimension>,
 }
@@ -63,6 +65,19 @@ pub struct NamedSolid {
     pub tolerance: Option<Tolerance>,
     /// Place of the name in its definition.
     pub span: Span,
+}
+
+/// A size of a standard solid that depends on the place, as in `sphere(x)`.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct VaryingSize {
+    /// Name of the solid.
+    pub function: String,
+    /// Name of the size.
+    pub parameter: String,
+    /// Place of its value.
+    pub value: Span,
+    /// Place of the call.
+    pub call: Span,
 }
 
 /// Which params stay open, and for which solids.

@@ -1,14 +1,17 @@
 //! Warnings about solids that `rfm check` finds by measuring them, and editors after a pause in typing.
 
+use std::collections::HashSet;
+
 use super::super::failure::Failure;
 use super::super::hidden::hidden;
+use super::super::lints::definition;
 use super::facts::{Facts, RESOLUTION, VOLUME_CELLS};
 use super::measure::measure;
-use rfm::diagnostic::{Code, Diagnostic};
+use rfm::diagnostic::{Code, Diagnostic, Span};
 use rfm::geom::Aabb;
 use rfm::glam::DVec3;
 use rfm::ir::{Axis, Magnitudes};
-use rfm::lower::NamedSolid;
+use rfm::lower::{NamedSolid, VaryingSize};
 use rfm::mesh::{Grid, ThinCells, Watch};
 use rfm::solid::{Bounds, Unbounded};
 use rfm::{Precision, Program, Solid};
@@ -54,6 +57,8 @@ pub(super) fn of_solid(
             let message = format!("solid `{}` is empty: ω is nowhere positive", named.name);
             found.push(warning(Code::EMPTY_SOLID, message));
         }
+        // a box would not make of values that are added or multiplied what is most likely meant
+        Bounds::Unbounded if reckons_with_shapes(program, named) => {}
         Bounds::Unbounded => {
             found.push(unbounded(program, named, solid));
         }
@@ -102,6 +107,16 @@ fn is_all_but_a_part(solid: &Solid) -> bool {
     })
 }
 
+/// Whether it is told that the formula of a solid adds or multiplies shapes.
+fn reckons_with_shapes(program: &Program, named: &NamedSolid) -> bool {
+    let Some(formula) = definition(program, named) else { return false };
+    program.warnings().list.iter().any(|warning| {
+        let at = warning.primary.span;
+        let is_within = at.source == formula.source && formula.start <= at.start && at.end <= formula.end;
+        warning.code == Code::SHAPES_AS_NUMBERS && is_within
+    })
+}
+
 /// A warning that says which operand of a solid was not found to end, and where.
 fn unbounded(program: &Program, named: &NamedSolid, solid: &Solid) -> Diagnostic {
     let why = solid.unbounded();
@@ -119,12 +134,34 @@ fn unbounded(program: &Program, named: &NamedSolid, solid: &Solid) -> Diagnostic
         }
         () => "intersect it with a box, or mesh it with --box",
     };
-    let warning = Diagnostic::warning(Code::UNBOUNDED_SOLID, named.span, message).help(help);
+    let warning = Diagnostic::warning(Code::UNBOUNDED_SOLID, named.span, message);
     let operand = why.filter(|why| !why.is_whole).and_then(|why| why.operand);
+    let is_part = |call: Span| {
+        operand.is_none_or(|at| at.source == call.source && at.start <= call.start && call.end <= at.end)
+    };
+    if let Some(VaryingSize { function, parameter, value, .. }) =
+        varying_size(program, named).filter(|size| is_part(size.call))
+    {
+        return warning
+            .label(*value, format!("`{parameter}` of `{function}` depends on the place here"))
+            .help(format!("give `{parameter}` a number, such as 1, or intersect the solid with a box"));
+    }
+    let warning = warning.help(help);
     match operand.filter(|operand| operand.source == named.span.source) {
         Some(operand) => warning.label(operand, "this operand has no bounds"),
         None => warning,
     }
+}
+
+/// The first size of a standard solid in the formula of a solid that depends on the place.
+fn varying_size<'a>(program: &'a Program, named: &NamedSolid) -> Option<&'a VaryingSize> {
+    let sizes = &program.module().varying_sizes;
+    if sizes.is_empty() {
+        return None;
+    }
+    let (graph, _) = program.module().graph.extract_cone(named.node);
+    let places: HashSet<Span> = graph.nodes().filter_map(|(node, _)| graph.span(node)).collect();
+    sizes.iter().find(|size| places.contains(&size.call))
 }
 
 /// A warning if ω may leave the range of numbers although its leaves do not.
