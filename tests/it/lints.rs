@@ -600,3 +600,27 @@ fn omega_that_is_zero_throughout_a_part_of_space_is_told() {
         assert_eq!(solid(shape).flat_room().is_some(), is_flat, "{shape}");
     }
 }
+
+/// The support radius that is stated against the one that the method takes of itself.
+#[test]
+fn a_support_radius_far_beyond_that_of_the_method_is_asked_about() {
+    let scene = |fluid: &str| {
+        let text = format!(
+            "rfm 1\nscene s {{\n  box {{ max: [1, 1, 1] }}\n  fluid {{ shape: z <= 0.5, spacing: 0.1{fluid} }}\n}}\n"
+        );
+        let program = Program::from_source("t.rfm", text).unwrap_or_else(|e| panic!("{e}"));
+        Experiment::new(&program, "s", Engine::Auto).unwrap_or_else(|e| panic!("{e}"))
+    };
+    let usual = scene("").parameters().support_radius;
+    for (factor, is_wide) in [(1.0, false), (2.4, false), (2.6, true)] {
+        let experiment = scene(&format!(", support_radius: {}", factor * usual));
+        let warnings = experiment.warnings();
+        let found = warnings.list.iter().find(|warning| warning.code.0 == "W0529");
+        assert_eq!(found.is_some(), is_wide, "{factor}: {warnings}");
+        if let Some(found) = found {
+            assert!(found.message.contains("2.6 times"), "{warnings}");
+            let proposed = found.help.as_ref().unwrap().trim_end_matches(" m").rsplit(' ').next().unwrap();
+            assert!((proposed.parse::<f64>().unwrap() / usual - 1.0).abs() < 0.05, "{warnings}");
+        }
+    }
+}
