@@ -46,16 +46,20 @@ pub fn reach(graph: &Graph, root: Node) -> Option<Aabb> {
     if !found.is_empty() && !has_ends(&found) {
         found = found.intersection(&junctions.by_choices(root));
     }
-    if !found.is_empty() && !has_ends(&found) {
-        found = found.intersection(&within_cube(&graph, root)?);
-    }
     (!found.is_empty() && has_ends(&found)).then_some(found)
 }
 
-/// The same, with sides that are near the points, mostly within a few per cent. Where [`reach`] is as near it has the bits
-/// of that.
+/// The same, with sides that are near the points, mostly within a few per cent, and for more formulas. Where [`reach`] is as
+/// near it has the bits of that. It takes longer, and finds more for params that are numbers than for arguments.
 pub fn close_reach(graph: &Graph, root: Node) -> Option<Aabb> {
-    let found = reach(graph, root)?;
+    let (graph, root) = folded(graph, root);
+    let (graph, root) = (&graph, root);
+    if graph.len() > MOST_NODES {
+        return None;
+    }
+    let Some(found) = reach(graph, root) else {
+        return within_cube(graph, root).filter(|found| !found.is_empty());
+    };
     let near = from_near(graph, root, found);
     let is_worth_it = (0..3).any(|i| near.size()[i] < WORTH * found.size()[i]);
     Some(if is_worth_it && !near.is_empty() { near } else { found })
@@ -71,7 +75,6 @@ fn within_cube(graph: &Graph, root: Node) -> Option<Aabb> {
 
 /// What subdivision leaves of a box around the points at which a root is positive.
 fn from_near(graph: &Graph, root: Node, space: Aabb) -> Aabb {
-    let (graph, root) = folded(graph, root);
     let (graph, root) = graph.extract_cone(root);
     let contractor = Contractor::new(&graph, root).without_ellipsoids();
     let interpreter = Interpreter::new(&graph, &[root]);
