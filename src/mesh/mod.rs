@@ -36,6 +36,7 @@
 //! Invariant: this module knows nothing of a compiler; it sees only [`Field`](crate::field::Field).
 
 mod ambiguity;
+mod branches;
 mod cases;
 mod check;
 mod collapse;
@@ -70,6 +71,7 @@ use glam::DVec3;
 
 use crate::geom::{Placement, significant};
 
+pub use branches::{Branches, branches};
 pub use check::{Report, check, is_closed_manifold};
 pub use distance::MeshDistance;
 pub use dual::dual_contouring;

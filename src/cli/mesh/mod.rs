@@ -20,7 +20,7 @@ use crate::cli::output::Shown;
 pub(super) use format::{ascii_help, format_name, output_help, unit_help, unit_name};
 use rfm::Solid;
 use rfm::field::Field;
-use rfm::geom::Aabb;
+use rfm::geom::{Aabb, place};
 use rfm::mesh::{
     self, Grid, GridError, LengthUnit, Mesh, MeshError, Quality, Reference, Resolution, ThinCells, Watch,
     WriteMesh, dual_contouring, marching_cubes,
@@ -342,6 +342,18 @@ fn remark(
         note(format!(
             "{parts} of the mesh {are} less than two cells across: so few cells show where {they}, and neither shape nor \
              volume; --cells with more, or a --box around one, shows these"
+        ));
+    }
+    if let Some(mesh::Branches { count, at }) = mesh::branches(mesh) {
+        let at = grid.map_or_else(|| at.to_string(), |grid| place(at, grid.bounds().size().max_element()));
+        let cure = match options.method {
+            MeshMethod::Dc => "`--method mc` or a part that is moved a little",
+            MeshMethod::Mc => "a part that is moved a little",
+        };
+        note(format!(
+            "more than two triangles meet at {}, as around {at}, for programs that join vertices at one place, as those that \
+             read STL do: they may take the mesh for no solid; {cure} has none",
+            output::counted(count, "edge")
         ));
     }
     // faces of walls and gaps that lie in one cell may pass through each other; dual contouring keeps them apart
