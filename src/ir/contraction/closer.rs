@@ -17,8 +17,8 @@ const GOAL: f64 = 0.02;
 /// Cells that are looked at for one side.
 const CELLS_OF_SIDE: usize = 200;
 
-/// Visits to nodes, of about a tenth of a second, and how many a cell takes: there and back for each of two halves.
-const MOST_VISITS: usize = 4_000_000;
+/// Visits to nodes, of some hundredths of a second at most, and how many a cell takes: there and back for each of two halves.
+const MOST_VISITS: usize = 1_000_000;
 const WALKS_OF_CELL: usize = 4;
 
 /// How often the sides are looked for, each time in a box of which the longest is less than half as long.

@@ -58,7 +58,7 @@ pub fn close_reach(graph: &Graph, root: Node) -> Option<Aabb> {
         return None;
     }
     let Some(found) = reach(graph, root) else {
-        return within_cube(graph, root).filter(|found| !found.is_empty());
+        return within_cube(graph, root).filter(|found| !found.is_empty() && has_ends(found));
     };
     let near = from_near(graph, root, found);
     let is_worth_it = (0..3).any(|i| near.size()[i] < WORTH * found.size()[i]);
