@@ -96,7 +96,7 @@ impl Lowering<'_> {
 
     /// ω + kd + cd²/2, which is positive wherever the distance within, plus d, is: ω is −kd − cd²/2 at the distance d
     /// outside. In this formula ω stands once, so that it shows where the solid ends.
-    fn offset_square(&mut self, leaf: Node, square: Square, length: Node, span: Span) -> Node {
+    pub(super) fn offset_square(&mut self, leaf: Node, square: Square, length: Node, span: Span) -> Node {
         let [slope, half] = [square.at_surface, 0.5 * square.bend].map(|number| self.constant(number));
         let bent = self.binary(Binary::Mul, half, length, span);
         let sum = self.binary(Binary::Add, slope, bent, span);

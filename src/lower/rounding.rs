@@ -11,7 +11,7 @@
 
 use rustc_hash::FxHashMap;
 
-use super::distances::Known;
+use super::distances::{Known, Square};
 use super::joints::{Joint, Side};
 use super::lowering::Lowering;
 use super::value::Value;
@@ -38,6 +38,8 @@ struct Rounded {
     fillets: i32,
     /// Half of the thickness of a single formula. Infinite where none is known.
     half: f64,
+    /// How a single formula that is a square of distances grows.
+    square: Option<Square>,
 }
 
 impl Lowering<'_> {
@@ -71,12 +73,12 @@ impl Lowering<'_> {
                 Joint::Least(parts) => self.plain(Binary::Min, of(parts), span),
                 Joint::Greatest(parts) => self.plain(Binary::Max, of(parts), span),
                 Joint::Leaf => {
-                    let Known { field, greatest, .. } = self.distance(side.node, within, &radii, span);
+                    let Known { field, greatest, square } = self.distance(side.node, within, &radii, span);
                     if side.negated {
                         let field = self.unary(Unary::Neg, field, span);
-                        Rounded { field, fillets: 0, half: f64::INFINITY }
+                        Rounded { field, fillets: 0, half: f64::INFINITY, square: None }
                     } else {
-                        Rounded { field, fillets: 0, half: greatest }
+                        Rounded { field, fillets: 0, half: greatest, square }
                     }
                 }
             };
@@ -115,7 +117,11 @@ impl Lowering<'_> {
                 Joint::Or([a, b]) | Joint::Greatest([a, b]) => {
                     self.binary(Binary::Max, wider[&a], wider[&b], span)
                 }
-                Joint::Leaf => self.binary(Binary::Add, rounded[side].field, by, span),
+                // in which ω stands once, so that it shows where the part ends
+                Joint::Leaf => match rounded[side].square {
+                    Some(square) => self.offset_square(side.node, square, by, span),
+                    None => self.binary(Binary::Add, rounded[side].field, by, span),
+                },
             };
             wider.insert(*side, node);
         }
@@ -158,6 +164,7 @@ impl Lowering<'_> {
             field: self.binary(op, a.field, b.field, span),
             fillets: a.fillets.max(b.fillets),
             half: f64::INFINITY,
+            square: None,
         }
     }
 
@@ -170,7 +177,7 @@ impl Lowering<'_> {
         let arc = self.binary(Binary::Sub, level, short, span);
         // never above the least but for rounding; said twice, bounds are found from either part
         let field = self.binary(Binary::Min, least, arc, span);
-        Rounded { field, fillets: parts[0].fillets.max(parts[1].fillets), half: f64::INFINITY }
+        Rounded { field, fillets: parts[0].fillets.max(parts[1].fillets), half: f64::INFINITY, square: None }
     }
 
     fn rounded_or(&mut self, parts: [Rounded; 2], radii: &Radii, span: Span) -> Rounded {
@@ -186,6 +193,7 @@ impl Lowering<'_> {
             field: self.binary(Binary::Max, most, arc, span),
             fillets: 1 + parts[0].fillets.max(parts[1].fillets),
             half: f64::INFINITY,
+            square: None,
         }
     }
 
